@@ -22,7 +22,8 @@ from asperity.inference.comparison.evidence import (
     leave_one_run_out,
     support,
 )
-from asperity.inference.fitting.fit import Data, fit, listed_data
+from asperity.inference.fitting.assembly import Data, listed_data
+from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.minima import FAR_OFF, GAIN, extends
 from asperity.inference.fitting.plausibility import stiffness_that_describes

@@ -9,24 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-import numpy as np
-
-from asperity.errors import Argument, InputError, require, symbol
-from asperity.inference.cycles import AveragedCycle, CycleTerm
+from asperity.errors import InputError
+from asperity.inference.fitting.assembly import Data, Given, listed_data, objective_of
 from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.estimated_noise import under_drift, with_noise
-from asperity.inference.fitting.inputs import (
-    fixed_values,
-    free_by_default,
-    require_counted,
-    require_enough,
-    require_masses,
-    require_motion,
-    require_some,
-    start_values,
-)
+from asperity.inference.fitting.inputs import free_by_default, require_some
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.plausibility import (
     contradicted_stiffness,
@@ -34,48 +23,21 @@ from asperity.inference.fitting.plausibility import (
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
-from asperity.inference.holds import HealingTable, HoldTerm, joined_holds
-from asperity.inference.objective import DataTerm, Minimum, Objective
-from asperity.inference.runs.assembly import (
-    USUAL_STIFFNESS,
-    RunOptions,
-    require_calibrated,
-    require_newtons,
-    require_no_layer,
-    require_own_samples,
-    require_seen,
-    run_terms,
-    shared_stiffness,
-    stiffness_of_table,
-    usual_ranges,
-)
+from asperity.inference.holds import HoldTerm
+from asperity.inference.objective import Minimum, Objective
+from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.blocks import coarser
-from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
-from asperity.inference.runs.gauge import GAIN
-from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.runs.cleaning import with_wrong_samples
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import (
-    Prior,
-    material_priors,
-    material_values,
-    require_free_names,
-    unknowns_of,
-)
+from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law
 from asperity.materials import Material
-from asperity.parameters import MACHINE, law_parameters
 from asperity.parameters.arguments import at_least, typed
-from asperity.recording import Trace
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
-#: Assumed mu0 (dimensionless) and V0 (m/s) for healing: it is measured relative to sliding, so that
-#: mu0 has no influence.
-_OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
-
-Data = LockInTable | HealingTable | AveragedCycle | RecordedRun | Trace
 
 
 @typed
@@ -162,33 +124,19 @@ def fit(
         raise InputError("law", "depend on the velocity", chosen.name, advice)
     options = runs or RunOptions()
     several = listed_data(data, options)
-    cycles = [d for d in several if isinstance(d, AveragedCycle)]
-    holds = [d for d in several if isinstance(d, HealingTable)]
-    tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
-    table = joined(tables)[0] if tables else None
+    others = [d for d in several if not isinstance(d, RecordedRun)]
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
-    for some, what in ((cycles, "cycles of stick-slip"), (holds, "tables of holds")):
-        if some and len(some) < len(several):
-            advice = "fit them one after the other, with the first as the prior of the second"
-            raise InputError("data", f"be {what} alone or other data", "both", advice)
-    if not (recordings or cycles or bare):
+    if not (recordings or bare):
         require_some(chosen, names)
-    numbers = _Given(fixed or {}, material, prior, start)
+    numbers = Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
-        return _objective(chosen, table, recordings, names, numbers, options=options, motion=motion)
+        data = [*others, *recordings]
+        return objective_of(chosen, data, names, numbers, options=options, motion=motion)
 
-    if cycles:
-        # A cycle needs a mass.
-        require_counted(numbers.fixed, motion, ("M", "inertia"), "cycles of stick-slip")
-        objective = _cycle_objective(chosen, cycles, free, numbers)
-    elif holds:
-        require_counted(numbers.fixed, motion, (), "a table of holds")
-        objective = _hold_objective(chosen, joined_holds(holds), names, numbers)
-    else:
-        objective = compared(recordings)
+    objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
 
@@ -217,6 +165,7 @@ def fit(
         if not left or before == [(run.wrong, run.doubts) for run in cleaner]:
             break
         objective = compared(cleaner)
+    holds = objective.terms_of(HoldTerm)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
         minima = _with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
@@ -227,16 +176,16 @@ def fit(
         return replace(result, sentences=(*warnings, *result.sentences, *filter(None, [other])))
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
-    if table is None and (given is not None or shared):
+    if not others and (given is not None or shared):
         laws = {k.name: result.values[k.name] for k in result.objective.interest}
         # The K of each recording begins at the fixed or shared one.
         begun = {**(start or {}), "K": given, **laws}
-        others = {n: v for n, v in numbers.fixed.items() if n != "K"}
+        without = {n: v for n, v in numbers.fixed.items() if n != "K"}
         freed = fit(
             recordings,
             law,
             [n for n in names if n != "K"],
-            **numbers._replace(fixed=others, start=begun)._asdict(),
+            **numbers._replace(fixed=without, start=begun)._asdict(),
             **motion,
             runs=runs,
             starts=1,
@@ -244,87 +193,6 @@ def fit(
         )
         warnings += contradicted_stiffness(result, freed, recordings, given)
     return replace(result, sentences=(*warnings, *result.sentences))
-
-
-class _Given(NamedTuple):
-    """Numbers of the caller; fields as the arguments of `fit`."""
-
-    fixed: Mapping[str, Any]
-    material: Material | None
-    prior: Material | Mapping[str, Prior] | None
-    start: Mapping[str, Any] | None
-
-    def priors(self, free: Sequence[str]) -> dict[str, Prior]:
-        """Priors by the names of free parameters."""
-        prior = self.prior
-        return material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
-
-
-def _hold_objective(
-    law: type[Law], table: HealingTable, free: list[str], given: _Given
-) -> Objective:
-    """The function to minimise for a table of holds; all inputs are checked."""
-    numbers = law_parameters(law)
-    for name in free:
-        holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
-        require(
-            holds, "free", f"be parameters of {law.name} with holds", f"'{symbol(name)}'", advice
-        )
-    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
-    constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
-    begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
-    unknowns = unknowns_of(law, free, start=begun, priors=priors)
-    require_free_names(unknowns, given.start, priors)
-    require_enough(table.name, table.rows, unknowns)
-    term = HoldTerm(table, law, constants)
-    return Objective((term,), law, unknowns, constants, tolerance=1e-9)
-
-
-def _cycle_objective(
-    law: type[Law],
-    cycles: Sequence[AveragedCycle],
-    free: Sequence[str] | None,
-    given: _Given,
-) -> Objective:
-    """The function to minimise for averaged cycles; all inputs are checked."""
-    first, numbers = cycles[0], law_parameters(law)
-    # The level of friction is fitted in each cycle.
-    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
-    level = float(np.mean(first.values[:-1]))
-    fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
-    names = [n for n in (*numbers, "K", "M") if n not in fixed] if free is None else list(free)
-    require_some(law, names)
-    advice = "leave it out: a constant friction is fitted in each cycle"
-    require("mu0" not in names, "free", "be what the shape of a cycle shows", "'mu0'", advice)
-    unseen = [c.name for c in cycles if not c.resolved]
-    if unseen and "M" in names:
-        rule = "be fixed where a slip is shorter than four samples"
-        raise InputError("M", rule, f"it free for {unseen[0]}", "fix M, or sample faster")
-    constants = fixed_values(law, None, names, fixed, given.material)
-    if "K" in fixed and "K" not in names:
-        constants["K"] = float(MACHINE["K"].check(fixed["K"]))
-    missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
-    if missing:
-        advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
-        raise InputError(
-            symbol(missing[0]), "be free or fixed for a fit of cycles", "neither", advice
-        )
-    priors = given.priors(names)
-    # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
-    K = first.loading_slope * first.W0 / first.V
-    M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
-    begun = {"K": K, "M": M} | start_values(law, names, given.start, given.material)
-    begun, priors = stiffness_of_table(begun, priors, [cycle.W0 for cycle in cycles])
-    usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
-    begun = {n: v for n, v in begun.items() if n in names}
-    unknowns = unknowns_of(law, names, start=begun, priors=priors, usual=usual)
-    require_free_names(unknowns, given.start, priors)
-    # A cycle needs a mass.
-    unknowns = tuple(
-        replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
-    )
-    terms = tuple(CycleTerm(cycle, law, constants) for cycle in cycles)
-    return Objective(terms, law, unknowns, constants, curved=True)
 
 
 def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
@@ -360,109 +228,3 @@ class _Steps:
 
     def again(self, done: int, total: int) -> None:
         self._report(self._total + done, self._total + total)
-
-
-def listed_data(
-    data: Data | Iterable[Data], options: RunOptions
-) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
-    """Data as a list, with recordings as `RecordedRun`."""
-    of_its_own = LockInTable | HealingTable | AveragedCycle | RecordedRun
-    several = [data] if isinstance(data, of_its_own | Trace) else list(data)
-    ready = [d if isinstance(d, of_its_own) else recorded_run(d) for d in several]
-    require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
-    rate = options.fit_rate
-    return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
-
-
-def _objective(
-    law: type[Law],
-    table: LockInTable | None,
-    recordings: Sequence[RecordedRun],
-    free: list[str],
-    given: _Given,
-    *,
-    options: RunOptions,
-    motion: Mapping[str, bool],
-) -> Objective:
-    """The function to minimise; all inputs are checked before anything is computed."""
-    fixed, material = given.fixed, given.material
-    require_motion(free, motion)
-    require_motion(fixed, motion, label="fixed")
-    if recordings:
-        require_no_layer(free)
-    if recordings and table is None:
-        require_seen(recordings, free)
-        if not any(run.load_varies for run in recordings):
-            counted = ("M", "eta", *motion)
-            require_counted(fixed, motion, counted, "a recording of a constant load")
-    # The stiffness of a recording is free, shared by all data if it is named.
-    shared = "K" in free
-    if table is not None and (shared or "K" in fixed):
-        require_newtons(recordings)
-    named = [name for name in free if not (name == "K" and recordings and table is None)]
-    priors = given.priors(free)
-    assumed = {}
-    if recordings and table is None:
-        first = recordings[0]
-        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
-    constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
-    require_masses(free, constants, motion)
-    begun = start_values(law, free, given.start, material, runs=recordings)
-    if table is not None and shared:
-        begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
-    if recordings:
-        require_calibrated(
-            recordings,
-            free,
-            priors,
-            mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
-            or table is not None,
-            with_table=table is not None,
-        )
-        # Its prior makes it free.
-        named = [name for name in named if name.partition("[")[0] != GAIN]
-    largest = 0.0 if table is None else float(table.points["epsilon"].max())
-    usual = usual_ranges(recordings) if recordings else {}
-    if "W0" in constants and "K" not in (*begun, *priors):
-        W0 = float(np.median(constants["W0"]))
-        usual["K"] = (USUAL_STIFFNESS[0] * W0, USUAL_STIFFNESS[1] * W0)
-    unknowns = list(
-        unknowns_of(
-            law,
-            named,
-            largest_epsilon=largest,
-            start=begun,
-            priors=priors,
-            usual=usual,
-        )
-    )
-    terms: list[DataTerm] = []
-    if table is not None:
-        count = sum(int(np.isfinite(v).sum()) for v in table.values.values())
-        require_enough(table.name, count, unknowns)
-        terms.append(LockInTerm(table, law, constants, **motion))
-    if recordings:
-        if shared and table is None:
-            unknowns.append(shared_stiffness(recordings, begun, priors))
-        if "mu0" in free and table is None:
-            options = replace(options, linear=tuple(n for n in options.linear if n != "offset"))
-        terms_of_runs, nuisances = run_terms(
-            recordings,
-            law,
-            {n: v for n, v in constants.items() if np.ndim(v) == 0},
-            with_table=table is not None,
-            shared_stiffness=shared,
-            fixed_stiffness=fixed.get("K"),
-            start=begun,
-            priors=priors,
-            options=options,
-            motion=motion,
-        )
-        terms += terms_of_runs
-        unknowns += nuisances
-    # The start of a K that is fixed has no influence.
-    of_free = {n: v for n, v in (given.start or {}).items() if not (n == "K" and recordings)}
-    require_free_names(unknowns, of_free, priors)
-    return Objective(
-        tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
-    )

@@ -68,8 +68,12 @@ def free_by_default(
     Returns
     -------
     list of str
-        Parameters of the law, and ``eps_ratio`` for a table.
+        Parameters of the law, ``eps_ratio`` for a table, and K and M for cycles of stick-slip.
     """
+    names = [name for name in law_parameters(law) if name not in REFERENCES]
+    if any(isinstance(d, AveragedCycle) for d in data):
+        # The level of friction is fitted in each cycle.
+        return [n for n in (*names, "K", "M") if n not in {"mu0", *(fixed or {})}]
     tables = [d for d in data if isinstance(d, LockInTable)]
     runs = [d for d in data if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
@@ -78,7 +82,6 @@ def free_by_default(
     if table is None or ("mean_friction" not in table.values and material and "mu0" in material):
         # The offset of a recording replaces mu0.
         known.add("mu0")
-    names = [name for name in law_parameters(law) if name not in REFERENCES]
     if table is not None:
         names.append(EPS_RATIO.name)
     return [n for n in names if n not in known and not (constant_load and n in _OF_LOAD_CHANGES)]

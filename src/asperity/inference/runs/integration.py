@@ -12,7 +12,6 @@ of the drive.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -26,7 +25,6 @@ from jax.flatten_util import ravel_pytree
 
 from asperity.algebra.runge_kutta import rodas_5p
 from asperity.algebra.small_systems import apply, inverse_points
-from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, shifted
 from asperity.inference.runs.gauge import GAIN
 from asperity.slider.motion import Motion
@@ -236,7 +234,6 @@ def _stepped(
     """States after a step, their error, and the coefficients of the continuous extension."""
     table, size = rodas_5p(), y.size
 
-    @jax.jit  # traced once for all stages
     def rates(at: Array, state: Array) -> Array:
         return motion.rates(state, excitation(drive, values, piece, at))
 
@@ -248,19 +245,20 @@ def _stepped(
     inverse = inverse_points(
         [[diagonal * (i == j) - columns[j][i] for j in range(size)] for i in range(size)]
     )
-    stages: list[Array] = []
-    for node, row, coupling, weight in zip(
-        table.nodes, table.A, table.C, table.by_time, strict=True
-    ):
-        state = y + _combined(row, stages) if stages else y
-        right = rates(begin + node * length, state) + length * weight * by_time
-        if stages:
-            right += _combined(coupling, stages) / length
+
+    def solved(stages: Array, row: Any) -> tuple[Array, None]:
+        k, node, A, C, weight = row
+        right = rates(begin + node * length, y + A @ stages) + length * weight * by_time
         # Explicit sums: products of such small matrices would take most of the time.
-        stages.append(jnp.stack(apply(inverse, right)))
-    new = state + stages[-1]
-    rows = jnp.stack([y, new - y, *(_combined(row, stages) for row in table.dense)])
-    return new, stages[-1], rows
+        stage = apply(inverse, right + C @ stages / length)
+        return stages.at[k].set(jnp.stack(stage)), None
+
+    # A loop: the law is compiled once and not for each stage.
+    rows = np.arange(len(table.nodes)), table.nodes, table.A, table.C, table.by_time
+    stages, _ = jax.lax.scan(solved, jnp.zeros((len(table.nodes), size)), rows)
+    new = y + table.A[-1] @ stages + stages[-1]
+    coefficients = jnp.stack([y, new - y, *(table.dense @ stages)])
+    return new, stages[-1], coefficients
 
 
 def _steps_taken(
@@ -310,13 +308,6 @@ def _steps_taken(
     # A last piece that was skipped has left a step without length.
     kept, curve = jax.tree.map(lambda all_, one: all_.at[n].set(one), (kept, curve), padding)
     return kept, curve, n, piece >= pieces
-
-
-def _combined(weights: Float, rates: Sequence[Array]) -> Array:
-    """Weighted sum of the rates; zero weights are skipped."""
-    return functools.reduce(
-        jnp.add, [w * k for w, k in zip(weights, rates, strict=False) if w != 0.0]
-    )
 
 
 def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:

@@ -1,0 +1,294 @@
+"""The function that a fit minimises, for data of any kind: all inputs are checked here.
+
+Its terms are lock-in tables and recordings, which may be fitted together, or tables of holds, or
+averaged cycles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from asperity.errors import Argument, InputError, require, symbol
+from asperity.inference.cycles import AveragedCycle, CycleTerm
+from asperity.inference.fitting.inputs import (
+    fixed_values,
+    require_counted,
+    require_enough,
+    require_masses,
+    require_motion,
+    require_some,
+    start_values,
+)
+from asperity.inference.holds import HealingTable, HoldTerm, joined_holds
+from asperity.inference.objective import DataTerm, Objective
+from asperity.inference.runs.assembly import (
+    USUAL_STIFFNESS,
+    RunOptions,
+    require_calibrated,
+    require_newtons,
+    require_no_layer,
+    require_own_samples,
+    require_seen,
+    run_terms,
+    shared_stiffness,
+    stiffness_of_table,
+    usual_ranges,
+)
+from asperity.inference.runs.cleaning import cleaned
+from asperity.inference.runs.gauge import GAIN
+from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.tables.table import LockInTable, joined
+from asperity.inference.tables.term import LockInTerm
+from asperity.inference.unknowns import (
+    Prior,
+    material_priors,
+    material_values,
+    require_free_names,
+    unknowns_of,
+)
+from asperity.laws import Law
+from asperity.materials import Material
+from asperity.parameters import MACHINE, law_parameters
+from asperity.recording import Trace
+
+#: Assumed mu0 (dimensionless) and V0 (m/s) for healing: it is measured relative to sliding, so that
+#: mu0 has no influence.
+_OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
+
+Measured = LockInTable | HealingTable | AveragedCycle | RecordedRun
+Data = Measured | Trace
+
+
+class Given(NamedTuple):
+    """Numbers of the caller; fields as the arguments of `fit`."""
+
+    fixed: Mapping[str, Any]
+    material: Material | None
+    prior: Material | Mapping[str, Prior] | None
+    start: Mapping[str, Any] | None
+
+    def priors(self, free: Sequence[str]) -> dict[str, Prior]:
+        """Priors by the names of free parameters."""
+        prior = self.prior
+        return material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
+
+
+def listed_data(data: Data | Iterable[Data], options: RunOptions) -> list[Measured]:
+    """Data as a list, with recordings as `RecordedRun`."""
+    several = [data] if isinstance(data, Measured | Trace) else list(data)
+    ready = [d if isinstance(d, Measured) else recorded_run(d) for d in several]
+    require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
+    rate = options.fit_rate
+    return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
+
+
+def objective_of(
+    law: type[Law],
+    data: Sequence[Measured],
+    free: Sequence[str],
+    given: Given,
+    *,
+    options: RunOptions | None = None,
+    motion: Mapping[str, bool] | None = None,
+) -> Objective:
+    """The function to minimise for some data.
+
+    Parameters
+    ----------
+    law : type of Law
+    data : sequence
+        As `listed_data` returns them.
+    free : sequence of str
+    given : Given
+    options : RunOptions, optional
+    motion : mapping, optional
+        Whether `inertia` and `radiation_damping` count; neither by default.
+
+    Raises
+    ------
+    InputError
+        As `fit`.
+    """
+    motion = motion or {"inertia": False, "radiation_damping": False}
+    cycles = [d for d in data if isinstance(d, AveragedCycle)]
+    holds = [d for d in data if isinstance(d, HealingTable)]
+    tables = [d for d in data if isinstance(d, LockInTable)]
+    recordings = [d for d in data if isinstance(d, RecordedRun)]
+    for some, what in ((cycles, "cycles of stick-slip"), (holds, "tables of holds")):
+        if some and len(some) < len(data):
+            advice = "fit them one after the other, with the first as the prior of the second"
+            raise InputError("data", f"be {what} alone or other data", "both", advice)
+    names = list(free)
+    if cycles:
+        # A cycle needs a mass.
+        require_counted(given.fixed, motion, ("M", "inertia"), "cycles of stick-slip")
+        return _of_cycles(law, cycles, names, given)
+    if holds:
+        require_counted(given.fixed, motion, (), "a table of holds")
+        return _of_holds(law, joined_holds(holds), names, given)
+    table = joined(tables)[0] if tables else None
+    options = options or RunOptions()
+    return _of_readings(law, table, recordings, names, given, options=options, motion=motion)
+
+
+def _of_holds(law: type[Law], table: HealingTable, free: list[str], given: Given) -> Objective:
+    """The function to minimise for a table of holds; all inputs are checked."""
+    numbers = law_parameters(law)
+    for name in free:
+        holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
+        require(
+            holds, "free", f"be parameters of {law.name} with holds", f"'{symbol(name)}'", advice
+        )
+    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
+    constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
+    begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
+    unknowns = unknowns_of(law, free, start=begun, priors=priors)
+    require_free_names(unknowns, given.start, priors)
+    require_enough(table.name, table.rows, unknowns)
+    term = HoldTerm(table, law, constants)
+    return Objective((term,), law, unknowns, constants, tolerance=1e-9)
+
+
+def _of_cycles(
+    law: type[Law],
+    cycles: Sequence[AveragedCycle],
+    free: list[str],
+    given: Given,
+) -> Objective:
+    """The function to minimise for averaged cycles; all inputs are checked."""
+    first, numbers = cycles[0], law_parameters(law)
+    # The level of friction is fitted in each cycle.
+    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
+    level = float(np.mean(first.values[:-1]))
+    fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
+    require_some(law, free)
+    advice = "leave it out: a constant friction is fitted in each cycle"
+    require("mu0" not in free, "free", "be what the shape of a cycle shows", "'mu0'", advice)
+    unseen = [c.name for c in cycles if not c.resolved]
+    if unseen and "M" in free:
+        rule = "be fixed where a slip is shorter than four samples"
+        raise InputError("M", rule, f"it free for {unseen[0]}", "fix M, or sample faster")
+    constants = fixed_values(law, None, free, fixed, given.material)
+    if "K" in fixed and "K" not in free:
+        constants["K"] = float(MACHINE["K"].check(fixed["K"]))
+    missing = [n for n in ("K", "M") if n not in free and not constants.get(n)]
+    if missing:
+        advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
+        raise InputError(
+            symbol(missing[0]), "be free or fixed for a fit of cycles", "neither", advice
+        )
+    priors = given.priors(free)
+    # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
+    K = first.loading_slope * first.W0 / first.V
+    M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
+    begun = {"K": K, "M": M} | start_values(law, free, given.start, given.material)
+    begun, priors = stiffness_of_table(begun, priors, [cycle.W0 for cycle in cycles])
+    usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
+    begun = {n: v for n, v in begun.items() if n in free}
+    unknowns = unknowns_of(law, free, start=begun, priors=priors, usual=usual)
+    require_free_names(unknowns, given.start, priors)
+    # A cycle needs a mass.
+    unknowns = tuple(
+        replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
+    )
+    terms = tuple(CycleTerm(cycle, law, constants) for cycle in cycles)
+    return Objective(terms, law, unknowns, constants, curved=True)
+
+
+def _of_readings(
+    law: type[Law],
+    table: LockInTable | None,
+    recordings: Sequence[RecordedRun],
+    free: list[str],
+    given: Given,
+    *,
+    options: RunOptions,
+    motion: Mapping[str, bool],
+) -> Objective:
+    """The function to minimise for a table, recordings, or both."""
+    fixed, material = given.fixed, given.material
+    require_motion(free, motion)
+    require_motion(fixed, motion, label="fixed")
+    if recordings:
+        require_no_layer(free)
+    if recordings and table is None:
+        require_seen(recordings, free)
+        if not any(run.load_varies for run in recordings):
+            counted = ("M", "eta", *motion)
+            require_counted(fixed, motion, counted, "a recording of a constant load")
+    # The stiffness of a recording is free, shared by all data if it is named.
+    shared = "K" in free
+    if table is not None and (shared or "K" in fixed):
+        require_newtons(recordings)
+    named = [name for name in free if not (name == "K" and recordings and table is None)]
+    priors = given.priors(free)
+    assumed = {}
+    if recordings and table is None:
+        first = recordings[0]
+        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
+    require_masses(free, constants, motion)
+    begun = start_values(law, free, given.start, material, runs=recordings)
+    if table is not None and shared:
+        begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
+    if recordings:
+        require_calibrated(
+            recordings,
+            free,
+            priors,
+            mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
+            or table is not None,
+            with_table=table is not None,
+        )
+        # Its prior makes it free.
+        named = [name for name in named if name.partition("[")[0] != GAIN]
+    largest = 0.0 if table is None else float(table.points["epsilon"].max())
+    usual = usual_ranges(recordings) if recordings else {}
+    if "W0" in constants and "K" not in (*begun, *priors):
+        W0 = float(np.median(constants["W0"]))
+        usual["K"] = (USUAL_STIFFNESS[0] * W0, USUAL_STIFFNESS[1] * W0)
+    unknowns = list(
+        unknowns_of(
+            law,
+            named,
+            largest_epsilon=largest,
+            start=begun,
+            priors=priors,
+            usual=usual,
+        )
+    )
+    terms: list[DataTerm] = []
+    if table is not None:
+        count = sum(int(np.isfinite(v).sum()) for v in table.values.values())
+        require_enough(table.name, count, unknowns)
+        terms.append(LockInTerm(table, law, constants, **motion))
+    if recordings:
+        if shared and table is None:
+            unknowns.append(shared_stiffness(recordings, begun, priors))
+        if "mu0" in free and table is None:
+            options = replace(options, linear=tuple(n for n in options.linear if n != "offset"))
+        terms_of_runs, nuisances = run_terms(
+            recordings,
+            law,
+            {n: v for n, v in constants.items() if np.ndim(v) == 0},
+            with_table=table is not None,
+            shared_stiffness=shared,
+            fixed_stiffness=fixed.get("K"),
+            start=begun,
+            priors=priors,
+            options=options,
+            motion=motion,
+        )
+        terms += terms_of_runs
+        unknowns += nuisances
+    # The start of a K that is fixed has no influence.
+    of_free = {n: v for n, v in (given.start or {}).items() if not (n == "K" and recordings)}
+    require_free_names(unknowns, of_free, priors)
+    return Objective(
+        tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
+    )
