@@ -23,6 +23,7 @@ from asperity.laws import (
     TwoState,
     registered,
 )
+from references.compilation import compiled_programs
 from references.populations import population
 
 #: What a converged point promises: relative in mean, harmonics and multipliers.
@@ -161,6 +162,29 @@ def test_other_laws_have_the_mean_harmonics_and_multipliers_of_their_published_e
 def test_every_reference_point_converges(case):
     name, response, _ = case
     assert list(response.result) == ["converged"] * len(POINTS[name])
+
+
+@pytest.mark.parametrize("name", population(SUITE))
+def test_hundreds_of_points_take_coarser_grids_with_the_same_results(name):
+    """Up to a block of 240 points takes the finest grid, for which one program is compiled."""
+    random = np.random.default_rng(1)
+    V, epsilon = 10 ** random.uniform(-7, -5, 480), random.uniform(0.005, 0.6, 480)
+    # No other test compiles programs for three harmonics.
+    options = {"waveform": 0, "harmonics": 3, "methods": ("fourier",)}
+    with compiled_programs() as compiled:
+        halves = [
+            respond(name, V[part], epsilon[part], 120.0, **options)
+            for part in (slice(0, 240), slice(240, None))
+        ]
+    assert sum("fast_solve" in program for program in compiled) == 1
+    with compiled_programs() as compiled:
+        whole = respond(name, V, epsilon, 120.0, **options)
+    assert sum("fast_solve" in program for program in compiled) == 2
+    assert whole.converged.all()
+    for field in ("mean_friction", "harmonics", "multipliers"):
+        expected = np.concatenate([np.asarray(getattr(half, field)) for half in halves])
+        error = np.abs(getattr(whole, field) - expected)
+        assert (error / np.maximum(np.abs(expected), VANISHING)).max() < PROMISED
 
 
 def test_mean_harmonics_and_multipliers_are_those_of_the_integration(reference, case):

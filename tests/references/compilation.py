@@ -4,6 +4,7 @@ Programs compiled in processes that tests start are not counted.
 """
 
 from collections import Counter, defaultdict
+from contextlib import contextmanager
 
 import pytest
 
@@ -27,6 +28,24 @@ def _count(event, duration_secs, **_):
 
 def _room(nodeid):
     return nodeid.split("::")[0].split("/")[1]
+
+
+@contextmanager
+def compiled_programs():
+    """A list of the names of the programs that are compiled, or read from the cache, meanwhile."""
+    import jax
+
+    names = []
+
+    def listen(event, *_, fun_name="", **__):
+        if _EVENTS.get(event) == "compiling":
+            names.append(fun_name)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        yield names
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -103,8 +103,8 @@ def _filled(first: int, count: int, size: int) -> Index:
 
 
 def chunk_of(index: Index, most: int) -> int:
-    """Points in a call that works on the points `index`: `FEW` if they are few, else `most`."""
-    return FEW if len(index) <= FEW else most
+    """Points in a call that works on the points `index`: `FEW`, `FAST_BLOCK` or `most`."""
+    return next(size for size in (FEW, FAST_BLOCK, most) if size >= min(len(index), most))
 
 
 def mesh_chunk(size: int) -> tuple[int, ...]:

@@ -1,6 +1,5 @@
 """Motion over a whole recording and its derivatives, compared with SciPy."""
 
-import jax
 import numpy as np
 import pytest
 from benchmarks.coverage import integrated
@@ -10,6 +9,7 @@ from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.gauge import reading_at
 from asperity.inference.runs.motion import recorded_friction, run_equations
 from asperity.laws import get_law
+from references.compilation import compiled_programs
 from references.populations import population
 
 VALUES = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "K": 4e3, "W0": 1.0}
@@ -69,18 +69,9 @@ def test_derivatives_agree_with_scipy(computed, name):
 def test_recordings_of_any_length_share_the_compiled_motion():
     drive = Drive(EDGES, PULL, np.ones(4), LOAD_SLOPE)
     few = recorded_friction(MOTION, AT, FREE, drive, reading_at(TIMES))
-    compiled = []
-
-    def listen(event, *_, fun_name="", **__):
-        if event.endswith("backend_compile_duration"):
-            compiled.append(fun_name)
-
     times = np.linspace(0.0, 70.0, 20 * 280 + 1)
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    try:
+    with compiled_programs() as compiled:
         many = recorded_friction(MOTION, AT, FREE, drive, reading_at(times))
-    finally:
-        jax.monitoring.unregister_event_duration_listener(listen)
     assert any("_read" in name for name in compiled), compiled
     assert not any("integrated" in name for name in compiled), compiled
     for a, b in zip(many, few, strict=True):

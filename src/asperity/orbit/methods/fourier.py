@@ -36,7 +36,7 @@ from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation, Harmonic, Modulation
-from asperity.orbit.batches import FAST_BLOCK, FEW, chunk_of, points_of, run_chunks, take
+from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
 from asperity.orbit.floquet import floquet_form
 from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.observables import Observables, waveform
@@ -440,8 +440,10 @@ class Fourier(Method):
         left = points[rate < LARGEST_CONTRACTING_RATE]
         # A block runs until its slowest point has converged, so points are sorted by difficulty.
         left = left[np.argsort(rate[left], kind="stable")]
-        # A few points take the finest grid at once: its time is short, compiling each grid is not.
-        for sharpest, nodes, grading in _GRIDS[-1:] if len(left) <= FEW else _GRIDS:
+        for sharpest, nodes, grading in _GRIDS:
+            # A few points take the finest grid at once: its time is short, compiling grids is not.
+            if len(left) <= FAST_BLOCK and nodes < _GRIDS[-1][1]:
+                continue
             solve = partial(
                 fast_solve,
                 nodes=nodes,
