@@ -6,6 +6,7 @@ from scipy.optimize import fsolve
 
 import asperity as asp
 from asperity.errors import InputError
+from references.populations import population
 
 #: Location of bifurcations, relative: what is promised.
 LOCATION = 1e-8
@@ -155,7 +156,10 @@ def test_points_of_a_branch_are_those_of_the_other_solver(stabilised):
 
 @pytest.mark.parametrize(
     ("parameter", "start", "end"),
-    [("K", 1.5e5, 4e5), ("A", 0.011, 0.02), ("velocity", 1e-6, 1e-5), ("W0", 5.0, 9.0)],
+    population(
+        [("velocity", 1e-6, 1e-5), ("W0", 5.0, 9.0), ("K", 1.5e5, 4e5), ("A", 0.011, 0.02)],
+        several=True,
+    ),
 )
 def test_any_parameter_can_be_continued(rapid, parameter, start, end):
     fixed = {"velocity": rapid.V, "epsilon": 0.05, "frequency": rapid.frequency}

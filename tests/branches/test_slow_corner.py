@@ -51,6 +51,7 @@ def solve(shooting):
     return solve
 
 
+@pytest.mark.long
 def test_an_orbit_at_the_end_of_a_canard_obeys_the_equations(solve, reference):
     K, frequency, epsilon, response = solve("an orbit at the end of a canard")
     assert response.converged[0]

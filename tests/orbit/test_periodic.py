@@ -230,7 +230,7 @@ def test_force_follows_slow_modulation_and_lags_fast_modulation_by_a_quarter_per
     assert response.mu1[0] == pytest.approx(0.5 * 0.005, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["rice-ruina", "elasto-plastic"])
+@pytest.mark.parametrize("name", population(["elasto-plastic", "rice-ruina"]))
 def test_the_fast_and_the_robust_method_agree(name):
     random = np.random.default_rng(20260)
     count = 96

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from benchmarks.residual import LAWS, answer, draw, faults, faults_marched
 
+from references.populations import population
+
 pytestmark = pytest.mark.slow
 
 SAMPLES = 4096
@@ -23,7 +25,7 @@ class Batch:
         return {name: a[rows] for name, a in self.numbers.items()}
 
 
-@pytest.fixture(scope="module", params=LAWS)
+@pytest.fixture(scope="module", params=population(LAWS))
 def batch(request):
     numbers = {name: np.append(a[:POINTS], a[0]) for name, a in draw(request.param, 75, 41).items()}
     # One that is not searched, for what is said of points that failed.

@@ -3,7 +3,7 @@
 import pytest
 
 
-def population(draws, *, short=1):
+def population(draws, *, short=1, several=False):
     """Values for `pytest.mark.parametrize`, of which those after the first are long.
 
     Parameters
@@ -12,9 +12,12 @@ def population(draws, *, short=1):
         Number of seeds, or the values.
     short : int
         Number of values that `make test` runs.
+    several : bool
+        Whether each value is a tuple of the values of several arguments.
     """
     values = list(range(draws) if isinstance(draws, int) else draws)
-    return [*values[:short], *(pytest.param(v, marks=pytest.mark.long) for v in values[short:])]
+    rest = (value if several else (value,) for value in values[short:])
+    return [*values[:short], *(pytest.param(*each, marks=pytest.mark.long) for each in rest)]
 
 
 def draws(few, many):

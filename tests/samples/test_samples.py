@@ -5,6 +5,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from references.populations import population
 
 
 def test_a_velocity_step_changes_steady_friction_by_a_minus_b() -> None:
@@ -63,7 +64,7 @@ def test_the_stick_slip_sample_loads_as_its_spring_says_and_slips_for_half_a_per
     assert 0.94 < moved < 1.0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 @pytest.mark.parametrize("name", ["velocity_steps", "slide_hold_slide", "modulated", "stick_slip"])
 def test_no_check_doubts_what_the_virtual_tribometer_has_recorded(name: str, seed: int) -> None:
     """Once, a hold was cut off in the middle of a block: seven of twelve slide-hold-slides."""

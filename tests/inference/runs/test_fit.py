@@ -490,7 +490,8 @@ def test_a_stiffness_shared_with_readings_may_be_given_over_the_load(steps_fit):
 
 
 @pytest.mark.parametrize(
-    ("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7), ("holds", 3e5, 5)]
+    ("case", "stiffness", "seed"),
+    population([("steps", 3e5, 0), ("holds", 1e6, 7), ("holds", 3e5, 5)], several=True),
 )
 def test_a_stiff_machine_hides_its_stiffness_only(monkeypatch, case, stiffness, seed):
     """The spring relaxes within 0.03 and 0.01 um of slip; samples are 0.3 to 1 um apart.
