@@ -25,9 +25,10 @@ T = TypeVar("T")
 #: alone and takes a fifth longer to compile). Vectors of 512 bits where the
 #: processor has them (256 is XLA's own choice) take a tenth off the fast method, and nothing off
 #: the others.
+_LEVEL = "xla_backend_optimization_level"
 _LARGE = {
     "xla_cpu_use_fusion_emitters": False,
-    "xla_backend_optimization_level": 1,
+    _LEVEL: 1,
     "xla_cpu_prefer_vector_width": 512,
 }
 #: The same where JAX's own switch sets the level.
@@ -79,16 +80,21 @@ def _mappings() -> tuple[int, float]:
         return 0, math.inf
 
 
-def jit_large(function: Callable[P, T], static_argnames: tuple[str, ...] = ()) -> Callable[P, T]:
+def jit_large(
+    function: Callable[P, T], static_argnames: tuple[str, ...] = (), *, brief: bool = False
+) -> Callable[P, T]:
     """`jax.jit` for a program of hundreds of operations: compiled and loaded in less time.
 
     JAX's own switch ``jax_disable_most_optimizations`` (``JAX_DISABLE_MOST_OPTIMIZATIONS``) holds
-    here too: such a program compiles in half the time, and runs several times as long.
+    here too: such a program compiles in half the time, and runs several times as long. `brief`
+    does so for a program that runs for a millisecond.
     """
 
     @cache
     def compiled(options: tuple[str, ...]) -> Callable[P, T]:
         chosen = {name: _LARGE[name] for name in options}
+        if brief and _LEVEL in chosen:
+            chosen[_LEVEL] = 0
         return jax.jit(function, static_argnames=static_argnames, compiler_options=chosen)
 
     @wraps(function)
