@@ -23,7 +23,8 @@ ROOT = pages.ROOT
 #: Pages whose code takes more than about three seconds. Other tests prove their content in every
 #: run: fits of the same recording and of tables (`tests/inference`), folds, bifurcations and
 #: boundaries (`tests/branches`), inertia and other loads (`tests/orbit`), maps (`tests/study`),
-#: loads of one's own (`tests/examples`), stick-slip (`tests/experiment`, `tests/measurement`).
+#: laws and loads of one's own (`tests/laws`, `tests/examples`), experiments (`tests/protocol`,
+#: `tests/cli`), stick-slip (`tests/experiment`, `tests/measurement`).
 SLOW = {
     "docs/tutorials/python.md",
     "docs/tutorials/velocity_step.md",
@@ -31,6 +32,7 @@ SLOW = {
     *("docs/healing.md", "docs/fitting.md", "docs/theory/continuation.md"),
     *("docs/tutorials/faults_and_tides.md", "docs/tutorials/vibration.md", "docs/modulations.md"),
     *("docs/theory/inertia.md", "docs/stick_slip.md", "docs/write_your_own_load.md"),
+    *("docs/write_your_own_law.md", "docs/running_experiments.md"),
 }
 #: Pages that `tests/papers/bureau2000/test_claims.py` runs, with its computed ledger.
 ELSEWHERE = {"docs/claims.md"}

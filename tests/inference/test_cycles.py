@@ -50,7 +50,7 @@ def test_residuals_at_the_truth_are_chi_squared():
     """Sums over recordings, of noise that is 2 % of the drop, and of cycles that are unlike too."""
     for spread in (0.0, 0.03):
         total, count = 0.0, 0
-        for seed in range(5):
+        for seed in range(3):
             term = CycleTerm(averaged_cycle(measured(seed, spread=spread)), RiceRuina, FIXED)
             residuals = term.residuals(TRUTH).values
             total, count = total + float(residuals @ residuals), count + residuals.size

@@ -20,8 +20,8 @@ K, M, W0, V = 5e4, 1.6, 7.0, 1e-4
 def test_the_motion_agrees_with_scipy_with_mu0_of_the_position() -> None:
     law = on_uneven_track(LAW, amplitude=0.02, length="20 um", exponent=3.0, origin="1 mm")
     slider = Slider(law, spring=K, load=W0, mass=M)
-    times = np.linspace(0, 0.5, 501)
-    drive = Programme(Slide(duration=0.5, velocity=V), load=W0, velocity=V / 2)
+    times = np.linspace(0, 0.25, 251)
+    drive = Programme(Slide(duration=0.25, velocity=V), load=W0, velocity=V / 2)
     motion = transient(slider, drive, sampling=times, inertia=True, rtol=1e-9)
 
     # The level is tabulated; `test_the_level_has_the_spectrum_of_its_formula` tests it.
@@ -37,7 +37,7 @@ def test_the_motion_agrees_with_scipy_with_mu0_of_the_position() -> None:
 
     start = [W0 * (float(level(0.0)) - (B - A) * np.log(V / 2 / V0)), np.log(V / 2)]
     start += [-np.log(V / 2 / V0), 0.0]
-    exact = solve_ivp(rates, (0, 0.5), start, "LSODA", times, rtol=1e-9, atol=1e-12)
+    exact = solve_ivp(rates, (0, 0.25), start, "LSODA", times, rtol=1e-9, atol=1e-12)
     assert np.ptp(exact.y[0]) > 0.1 * W0
     np.testing.assert_allclose(motion.force, exact.y[0], atol=1e-4 * W0)
     np.testing.assert_allclose(motion.displacement, exact.y[3], atol=1e-4 * W0 / K)

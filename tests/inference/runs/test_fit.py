@@ -385,9 +385,10 @@ def test_a_jump_of_the_gauge_is_fitted_and_named(steps_fit):
 
 
 def test_a_motion_that_the_law_cannot_describe_is_named(steps_fit):
+    """A lag of the gauge of ten samples, which nothing states."""
     (run,) = runs_of(CASE, 1)
-    mirrored = replace(run, friction=1.2 - run.friction)
-    result = fit(mirrored, "rice-ruina", FREE, start=TRUE, starts=1)
+    lagging = lfilter([0.1], [1.0, -0.9], run.friction, zi=[0.9 * run.friction[0]])[0]
+    result = fit(replace(run, friction=lagging), "rice-ruina", FREE, start=TRUE, starts=1)
     assert any("just after changes of its drive" in w for w in result.warnings)
     assert not any("just after changes" in w for w in steps_fit.warnings)
 
