@@ -22,6 +22,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import jit_large
 from asperity.arrays import batches
 from asperity.loads import Excitation
 from asperity.loads.programme.segment import ProgrammeSegment
@@ -144,7 +145,7 @@ def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     return jnp.stack([jnp.broadcast_to(a, t.shape) for a in columns])
 
 
-_read_points = jax.jit(_read)
+_read_points = jit_large(_read)
 
 
 def motion_samples(system: SegmentEquations, t: np.ndarray, Y: np.ndarray) -> MotionSamples:
@@ -158,12 +159,14 @@ def motion_samples(system: SegmentEquations, t: np.ndarray, Y: np.ndarray) -> Mo
 
 def step_samples(system: SegmentEquations, chunk: StepChunk) -> MotionSamples:
     """Evaluate the steps of a chunk at `DenseOutput.refined`."""
-    inner, end = jax.device_get(_read_steps(system, chunk))
-    return MotionSamples(*np.concatenate([inner[:, : PARTS * int(chunk.taken)], end], axis=1))
+    columns = np.asarray(_read_steps(system, chunk))
+    inner, end = columns[:, : PARTS * int(chunk.taken)], columns[:, -1:]
+    return MotionSamples(*np.concatenate([inner, end], axis=1))
 
 
-@jax.jit
-def _read_steps(system: SegmentEquations, chunk: StepChunk) -> tuple[Array, Array]:
+@jit_large
+def _read_steps(system: SegmentEquations, chunk: StepChunk) -> Array:
+    """All steps with their padding, and the end of the last step."""
     shares = jnp.arange(PARTS) / PARTS
     t = chunk.begin[:, None] + chunk.length[:, None] * shares
     powers = jnp.moveaxis(chunk.coefficients, 0, -1)[..., None]
@@ -171,7 +174,8 @@ def _read_steps(system: SegmentEquations, chunk: StepChunk) -> tuple[Array, Arra
     for coefficient in powers[-2::-1]:
         Y = Y * shares + coefficient
     Y = jnp.broadcast_to(Y, (Y.shape[0], *t.shape)).reshape(Y.shape[0], -1)
-    return _read(system, t.ravel(), Y), _read(system, chunk.t[None], chunk.Y[:, None])
+    t, Y = jnp.append(t.ravel(), chunk.t), jnp.concatenate([Y, chunk.Y[:, None]], axis=1)
+    return _read(system, t, Y)
 
 
 def states_across_break(

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
@@ -123,17 +124,24 @@ def _combined(weights: np.ndarray, stages: Array) -> Array:
     return (weights[:, None] * stages[: len(weights)]).sum(0)
 
 
-@jax.jit
+@jit_large
 def _dense(
     system: SegmentEquations, begin: Array, length: Array, states: Array, stages: Array
 ) -> Array:
     """Polynomials of all steps at once, shape (STEPS, 8, size)."""
-    table = dormand_prince_8()
+    table, first = dormand_prince_8(), stages.shape[1]
+    further = len(table.extra_A)
     # Steps last: operations on all of them run along memory.
     states, stages = states.T, jnp.moveaxis(stages, 0, -1)
-    for row, c in zip(table.extra_A, table.extra_C, strict=True):
-        inner = states + length * jnp.tensordot(row[: len(stages)], stages, 1)
-        slope = system.rates(system.at(begin + c * length), inner)
-        stages = jnp.concatenate([stages, slope[None]])
+
+    def stage(k: Array, stages: Array) -> Array:
+        inner = states + length * jnp.tensordot(rows[k], stages, 1)
+        slope = system.rates(system.at(begin + C[k] * length), inner)
+        return stages.at[first + k].set(slope)
+
+    # A loop: the law is compiled once and not for each stage.
+    rows, C = jnp.asarray(table.extra_A), jnp.asarray(table.extra_C)
+    room = jnp.zeros((further, *stages.shape[1:]))
+    stages = jax.lax.fori_loop(0, further, stage, jnp.concatenate([stages, room]))
     powers = length * jnp.tensordot(table.powers, stages, 1)
     return jnp.moveaxis(powers.at[0].add(states), -1, 0)
