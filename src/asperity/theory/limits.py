@@ -24,6 +24,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.algebra.small_systems import (
     Matrix,
     apply,
@@ -165,7 +166,7 @@ def even_phases(nodes: int) -> np.ndarray:
     return 2 * np.pi * np.arange(nodes)[:, None] / nodes
 
 
-@partial(jax.jit, static_argnames=("nodes",))
+@partial(jit_large, static_argnames=("nodes",))
 def adiabatic_states(problem: Problem, *, nodes: int) -> Array:
     """Steady states at even phases, at their pulling velocities; (size, nodes, points)."""
     system, load = problem
@@ -177,7 +178,7 @@ def adiabatic_states(problem: Problem, *, nodes: int) -> Array:
     return jnp.stack([state * ones for state in (*mechanical, *law.steady_state(system.V * pull))])
 
 
-@jax.jit
+@jit_large
 def adiabatic_growth(problem: Problem) -> Array:
     """Exponent by which a disturbance grows within a period, over the phases at which it does."""
     system, load = problem

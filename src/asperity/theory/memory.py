@@ -26,6 +26,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import jit_large
 from asperity.algebra.small_systems import spectral_abscissa
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
@@ -114,7 +115,7 @@ def _growth(law: Law, V: float, k: Float) -> Float:
 
 
 @typed
-@jax.jit
+@jit_large
 def steady_growth(motion: Motion) -> Array:
     """Growth rate of a small disturbance of steady sliding.
 

@@ -29,6 +29,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import jit_large
 from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.loads import Excitation
 from asperity.parameters import DRIVE
@@ -193,7 +194,7 @@ def perturb(system: Motion) -> PerturbationResponse:
     return jax.tree.map(lambda leaf: leaf.reshape(shape + leaf.shape[1:]), response)
 
 
-@eqx.filter_jit
+@jit_large
 def _expand(system: Motion) -> PerturbationResponse:
     """Solve the three linear problems; every leaf of `system` has shape (points,)."""
     Y0 = system.steady()

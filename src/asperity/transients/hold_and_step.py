@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.slider import QuasiStatic, Slider
 from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_many
 
@@ -92,13 +92,13 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     return _after_hold(slider, V, steady, holding, reloaded)
 
 
-@jax.jit
+@jit_large
 def _steady(slider: Slider, V: Array) -> Array:
     """States of steady sliding with no displacement yet, shape (points, size + 1)."""
     return _from_here(QuasiStatic(slider, V, 1.0).steady())
 
 
-@jax.jit
+@jit_large
 def _after_hold(
     slider: Slider, V: Array, steady: Array, holding: Reached, reloaded: Reached
 ) -> tuple[HoldResponse, Reached]:
@@ -165,7 +165,7 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
     return _after_step(slider, V, start, reached), reached
 
 
-@jax.jit
+@jit_large
 def _after_step(slider: Slider, V: Array, start: Array, reached: Reached) -> StepResponse:
     motion = QuasiStatic(slider, V, 1.0)
     lost = reached.end == End.TOO_MANY_STEPS
@@ -197,7 +197,7 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     return _settling(slider, V, extremum, on)
 
 
-@jax.jit
+@jit_large
 def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Drive:
     """The drive from an extremum on."""
     motion = QuasiStatic(slider, V, 1.0)
@@ -208,7 +208,7 @@ def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> D
     return Drive(level=level, width=width, runaway=runaway, steady=close)
 
 
-@jax.jit
+@jit_large
 def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> SettlingDistance:
     crossing = extremum.end == End.CROSSING
     over = crossing & (on.end == End.STEADY)

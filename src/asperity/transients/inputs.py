@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, State
@@ -85,7 +86,7 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
     require(defined, "initial", "leave an interface force that is not negative", got, advice)
 
 
-@jax.jit
+@jit_large
 def _rates_and_friction(first: SegmentEquations, Y: Array) -> tuple[Array, Array]:
     """Rates (1/s) and F_i/W at the beginning of a segment."""
     at = first.at(jnp.zeros(()))
@@ -138,7 +139,7 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))
 
 
-@jax.jit
+@jit_large
 def _steady(first: SegmentEquations, v: Array, w: Array) -> Array:
     """States from `v` (m/s) under the load `w`, over W0, at the beginning of a segment."""
     motion, law = first.motion, first.motion.slider.law

@@ -25,6 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import value_and_jacobian
 from asperity.arrays import Float
@@ -108,7 +109,7 @@ def _directions(structure: Any, names: tuple[str, ...]) -> list[Any]:
     return [with_value(Problem(none, None), known[name], 1.0).system for name in names]
 
 
-@jax.jit
+@jit_large
 def _slopes(motion: Motion, directions: list[Any], Y: Array) -> tuple[Array, list[Array]]:
     at = Excitation(jnp.ones(Y.shape[1:]))
     _, jacobian = value_and_jacobian(lambda Y: motion.rates(Y, at), Y)

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
 from asperity.inference.runs.gauge import GAIN, Reading
@@ -168,10 +169,10 @@ def through(
 
 #: Compiled apart from the reading: recordings of any number of samples share the program of a law,
 #: which takes most of the time to compile.
-_integrated = eqx.filter_jit(integrated)
+_integrated = jit_large(integrated, static_argnames=("room",))
 
 
-@eqx.filter_jit
+@jit_large
 def _read(
     motion: Motion,
     free: Free,

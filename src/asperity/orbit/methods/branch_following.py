@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Float, Index
 from asperity.loads import Excitation
@@ -248,7 +249,7 @@ class MovingBranches(Curves):
         self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
 
 
-@jax.jit
+@jit_large
 def _least_direct_effect(problem: Problem, orbit: Orbit) -> Array:
     """Smallest d(F_i/W)/d ln v at the nodes of an orbit, over that of steady sliding, (points,).
 
@@ -271,7 +272,7 @@ def _least_direct_effect(problem: Problem, orbit: Orbit) -> Array:
     return (along / steady).min(0)
 
 
-@jax.jit
+@jit_large
 def _largest_exponent(problem: Problem, orbit: Orbit) -> Array:
     """Largest ln(v/V) that the forces of an orbit permit, with inertia or radiation damping.
 
