@@ -52,6 +52,16 @@ BRIEF = (
 )
 _SWITCH = "jax_disable_most_optimizations"
 
+#: Fixtures that take seconds: whole figures, claims and experiments of a paper. Tests with them are
+#: not for `make quick`.
+SLOW_FIXTURES = {"figures", "claims", "experiment"}
+
+
+def is_short(item):
+    """Whether a test takes little time once its programs are compiled."""
+    marked = any(map(item.get_closest_marker, ("slow", "long")))
+    return not marked and SLOW_FIXTURES.isdisjoint(item.fixturenames)
+
 
 def room(nodeid):
     """The folder of a test."""
@@ -74,8 +84,7 @@ def scope(nodeid):
 def pytest_collection_modifyitems(items):
     """Sort rooms, those with few optimisations last, and mark the tests of `make quick`."""
     for _, file in groupby(items, key=lambda item: item.path):
-        short = (i for i in file if not any(map(i.get_closest_marker, ("slow", "long"))))
-        for first in islice(short, 1):
+        for first in islice(filter(is_short, file), 1):
             first.add_marker("quick")
     order = {name: place for place, name in enumerate(LONGEST)}
     last = len(order)

@@ -23,6 +23,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case", population(["shared by both", *(c for c in CASES if c != "shared by both")])
 )
