@@ -16,6 +16,7 @@ import jax
 P = ParamSpec("P")
 T = TypeVar("T")
 
+_LEVEL = "xla_backend_optimization_level"
 #: Options of large programs. XLA's older generator of code makes a few pieces of a program where
 #: the newer one compiles every operation for itself: of hundreds of operations it makes half of the
 #: memory mappings in half to two thirds of the time. Optimisation at level 1 takes off another
@@ -24,8 +25,8 @@ T = TypeVar("T")
 #: programs over long arrays are slower with either (jaxlib 0.10.2; 0.12 has the newer generator
 #: alone and takes a fifth longer to compile). Vectors of 512 bits where the
 #: processor has them (256 is XLA's own choice) take a tenth off the fast method, and nothing off
-#: the others.
-_LEVEL = "xla_backend_optimization_level"
+#: the others. Integrations of many motions at once take a fifth (holds) to twice (shooting) as long
+#: with these options and are compiled without.
 _LARGE = {
     "xla_cpu_use_fusion_emitters": False,
     _LEVEL: 1,

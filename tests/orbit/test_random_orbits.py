@@ -104,7 +104,7 @@ OTHERS = {
     "prakash-clifton": {"L": "0.3 um", "V_star": "0.1 um/s"},
 }
 LAWS = sorted(name for name, law in registered().items() if law.rate_dependent)
-#: In every run: of one, two and three states, with elastic asperities, and one that may rest.
+#: In every run: laws of one and of two states, with elastic asperities, and one that may rest.
 SUITE = ("cut-off", "elasto-plastic", "prakash-clifton", "two-state")
 EQUATIONS = (
     {},
