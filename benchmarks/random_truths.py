@@ -1,7 +1,7 @@
 """Fits to tables with random true values: missed minima, and coverage of the intervals.
 
     python -m benchmarks.random_truths [--law elasto-plastic] [--tables 40] [--seed 0] [--slow]
-        [--compare] [--out FILE]
+        [--few] [--compare] [--out FILE]
 
 Each table has 25 to 60 rows at two to four velocities of 0.1 to 100 um/s and one to three
 frequencies of 1 Hz to 1 kHz, with mu0, A, B, D0, eps_ratio (and lambda or alpha) drawn over a
@@ -9,8 +9,9 @@ decade or two, 1 % noise in both parts of the harmonics and 0.3 % in the mean; e
 has no phases. All these parameters are free. A minimum is missed if a minimisation from the truth
 ends lower by 0.01. With --slow, each row has another velocity of 0.3 to 10 um/s and another
 frequency of 0.1 to 10 Hz, amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as
-stable sliding needs. With --compare, each table is compared with three laws, and the verdicts on
-the true law are counted.
+stable sliding needs. With --few, tables have 8 to 13 rows with the mean, mu1, or both, which often
+leave parameters undetermined; estimates whose response is unstable are counted. With --compare,
+each table is compared with three laws, and the verdicts on the true law are counted.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from functools import partial
 
 import numpy as np
 
@@ -80,7 +82,7 @@ def slow_point(rng, law):
 
 
 def drawn_table(seed, law, response, drawn=fast_point):
-    """Random true values, fixed numbers, and a table of their responses with noise."""
+    """Random true values, fixed numbers, and a table of their stable responses with noise."""
     rng = np.random.default_rng([seed, len(law)])
     while True:
         truth, fixed, point = drawn(rng, law)
@@ -88,8 +90,13 @@ def drawn_table(seed, law, response, drawn=fast_point):
         padded = {n: np.pad(v, (0, ROWS - rows), mode="edge") for n, v in point.items()}
         padded["epsilon"] = truth["eps_ratio"] * padded["epsilon"]
         numbers = {n: v for n, v in truth.items() if n != "eps_ratio"} | fixed
-        exact = response(padded | {n: np.full(ROWS, v) for n, v in numbers.items()})
-        converged = np.asarray(exact.outcome)[:rows] == Outcome.CONVERGED
+        everything = padded | {n: np.full(ROWS, v) for n, v in numbers.items()}
+        exact = response(everything)
+        # An unstable response is never read.
+        converged = (np.asarray(exact.outcome) == Outcome.CONVERGED) & (
+            response.growth(everything) < 0
+        )
+        converged = converged[:rows]
         if converged.sum() >= 25:
             break
     mean, harmonics = np.asarray(exact.mean_friction)[:rows], np.asarray(exact.harmonics)[:rows]
@@ -106,9 +113,20 @@ def drawn_table(seed, law, response, drawn=fast_point):
     return truth, fixed, table_of({name: column[converged] for name, column in columns.items()})
 
 
-def fitted(seed, law, response, drawn=fast_point):
+def few_readings(table, rng):
+    """Some rows of a table, with one or two observables."""
+    rows = rng.choice(table.rows, int(rng.integers(8, 14)), replace=False)
+    columns = {name: column[rows] for name, column in table.points.items()}
+    for name in [("mean_friction",), ("mu1",), ("mean_friction", "mu1")][rng.integers(3)]:
+        columns |= {name: table.values[name][rows], f"{name}_err": table.errors[name][rows]}
+    return table_of(columns)
+
+
+def fitted(seed, law, response, drawn=fast_point, *, few=False):
     """Result of a fit to one table, compared with the truth."""
     truth, fixed, table = drawn_table(seed, law, response, drawn)
+    if few:
+        table = few_readings(table, np.random.default_rng(seed))
     began = time.process_time()
     result = fit(table, law, list(truth), fixed=fixed)
     seconds = time.process_time() - began
@@ -124,6 +142,7 @@ def fitted(seed, law, response, drawn=fast_point):
         "missed_by": result.chi2 - from_truth,
         "inside": inside,
         "undetermined": result.undetermined,
+        "unstable": any("is unstable" in warning for warning in result.warnings),
         "minima": 1 + len(result.optima),
         "seconds": seconds,
     }
@@ -159,6 +178,7 @@ def main():
     parser.add_argument("--tables", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0, help="of the first table")
     parser.add_argument("--slow", action="store_true", help="modulation of 0.1 to 10 Hz")
+    parser.add_argument("--few", action="store_true", help="8 to 13 rows, one or two observables")
     parser.add_argument("--compare", action="store_true", help="compare three laws")
     parser.add_argument("--out", help="file for a line of JSON for each table")
     chosen = parser.parse_args()
@@ -166,7 +186,7 @@ def main():
     drawn = slow_point if chosen.slow else fast_point
     rows = []
     for seed in range(chosen.seed, chosen.seed + chosen.tables):
-        each = compared if chosen.compare else fitted
+        each = compared if chosen.compare else partial(fitted, few=chosen.few)
         rows.append(each(seed, chosen.law, response, drawn))
         if chosen.out:
             with open(chosen.out, "a", encoding="utf-8") as file:
@@ -182,6 +202,9 @@ def main():
         excluded, left = (sum(map(bool, (r[n] for r in rows))) for n in ("excluded", "left_out"))
         print(f"true law excluded: {excluded}; rows left out of tables without outliers: {left}")
         return
+    unstable = [row for row in rows if row["unstable"]]
+    known = sum(not row["undetermined"] for row in unstable)
+    print(f"unstable estimates: {len(unstable)}, of these {known} with all parameters determined")
     print("| parameter | 68.3 % | 95 % |\n|---|---|---|")
     for name in rows[0]["inside"]:
         share = 100 * np.mean([row["inside"][name] for row in rows], axis=0)

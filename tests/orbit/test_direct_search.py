@@ -213,3 +213,33 @@ def test_the_coarse_search_has_the_orbits_of_smooth_sliding():
     mean, harmonics = integrated(EPSILON[0])
     assert values.mean_friction[0] == pytest.approx(mean, rel=1e-6)
     np.testing.assert_allclose(values.harmonics[0], harmonics, rtol=1e-5)
+
+
+def test_growth_is_that_of_a_perturbed_orbit_stable_or_not():
+    """ln of the spectral radius of the monodromy matrix, from SciPy's integration of two orbits."""
+    numbers = {**NUMBERS, "B": 0.0202, "V": 4e-6, "frequency": 0.7, "epsilon": 0.02}
+    critical = (numbers["B"] - numbers["A"]) * numbers["W0"] / numbers["D0"]
+    for K in (0.7 * critical, 1.5 * critical):
+        p = {**numbers, "K": K}
+        steady = p["mu0"] - (p["B"] - p["A"]) * math.log(p["V"] / p["V0"])
+        omega = 2 * np.pi * p["frequency"]
+
+        def rates(theta, state, p=p, steady=steady, omega=omega):
+            force, phi = state
+            w = 1 + p["epsilon"] * math.cos(theta)
+            slip = p["V"] * math.exp((force / w - steady - p["B"] * phi) / p["A"])
+            age = (p["V"] * math.exp(-phi) - slip) / p["D0"]
+            return [p["K"] / p["W0"] * (p["V"] - slip) / omega, age / omega]
+
+        def period(start, rates=rates):
+            run = solve_ivp(rates, (0, 2 * np.pi), start, "DOP853", rtol=1e-12, atol=1e-14)
+            return run.y[:, -1]
+
+        start, h = np.array([steady, 0.0]), 1e-6 * np.eye(2)
+        for _ in range(8):
+            columns = [(period(start + d) - period(start - d)) / 2e-6 for d in h]
+            monodromy = np.transpose(columns)
+            start = start - np.linalg.solve(monodromy - np.eye(2), period(start) - start)
+        expected = math.log(np.abs(np.linalg.eigvals(monodromy)).max())
+        assert (expected > 0) == (critical > K)
+        assert DIRECT.growth(p) == pytest.approx([expected], abs=1e-6)

@@ -250,6 +250,10 @@ class DataTerm(ABC):
         """
         return ()
 
+    def instability(self, values: Mapping[str, float]) -> Sequence[str]:
+        """Sentences on data that are no measurement if the free parameters are `values`, in SI."""
+        return ()
+
 
 @dataclass
 class Objective:

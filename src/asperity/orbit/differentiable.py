@@ -38,7 +38,7 @@ from asperity.orbit.gradient.parametrised import (
     coefficients_of,
     load_values,
 )
-from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, search_orbits
+from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, growth_of, search_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
@@ -182,6 +182,31 @@ class ResponseFunction:
         )
         columns = zip(self._program.equations.names, cut, strict=True)
         return values, {n: derivative(c) for n, c in columns if names is None or n in names}
+
+    @typed
+    def growth(
+        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
+    ) -> Float:
+        """Growth of perturbations in a period, ln |m| with the largest Floquet multiplier m.
+
+        Where it is positive, the response is unstable: the slider leaves it and is not measured
+        there. Orbits are searched for as by ``search="coarse"``, with errors of about 1e-6.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array
+            As for a call.
+        known : KnownOrbits, optional
+            Orbits of the same points, where the search begins; those that it finds replace them.
+
+        Returns
+        -------
+        array, shape (points,)
+            NaN where the search finds no orbit.
+        """
+        padded, points = self._padded(parameters)
+        numbers = {n: np.asarray(v)[: points or 1] for n, v in padded.items()}
+        return growth_of(self.equations, numbers, known)
 
     def _orbits(
         self,

@@ -54,6 +54,9 @@ class Formula(LockInTerm):
     def warnings(self, residuals, information, outliers=()):
         return []
 
+    def instability(self, values):
+        return []
+
     def weighted(self, weights):
         return Weighted(self, weights)
 

@@ -1,6 +1,7 @@
 """Tables with covariances, tables that ``asperity measure`` writes, and outlying rows."""
 
 import json
+import math
 from functools import partial
 
 import numpy as np
@@ -235,3 +236,22 @@ def test_a_table_without_headings_is_refused(tmp_path):
     path.write_text("1e-6,0.1\n2e-6,0.2\n")
     with pytest.raises(InputError, match="must have the columns V, epsilon, frequency"):
         read_table(path)
+
+
+def test_unstable_responses_are_no_readings(pmma):
+    """Below the stiffness (B - A) W0 / D0 steady sliding, and here its response, is unstable."""
+    laws = {name: pmma.law("rice-ruina", B=0.026, D0=D0) for name, D0 in (("+", 4e-7), ("-", 8e-8))}
+    critical = {name: (law.B - law.A) * 7.0 / law.D0 for name, law in laws.items()}
+    K = math.sqrt(critical["+"] * critical["-"])
+    velocity = np.repeat([1e-6, 3e-6, 1e-5], 3)
+    point = {"velocity": velocity, "epsilon": np.tile([0.1, 0.2, 0.3], 3), "frequency": 120.0}
+    for name, law in laws.items():
+        response = periodic_response(Slider(law, spring=K, load=7.0), **point)
+        assert response.stable.all() if name == "+" else not response.stable.any()
+        columns = {"V": velocity, "epsilon": point["epsilon"], "frequency": 120.0}
+        columns |= {"mean_friction": response.mean_friction, "mean_friction_err": 1e-3}
+        fixed = {"B": law.B, "D0": law.D0, "V0": law.V0, "K": K, "W0": 7.0}
+        result = fit(table_of(columns), "rice-ruina", ("mu0", "A"), fixed=fixed)
+        assert result.values["A"] == pytest.approx(float(law.A), rel=1e-3)
+        said = [w for w in result.warnings if "9 of 9 rows is unstable" in w]
+        assert len(said) == (name == "-")

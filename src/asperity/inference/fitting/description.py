@@ -486,6 +486,8 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
     information = np.sum([J.T @ J for J in slopes], axis=0)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         warnings += term.warnings(residuals, information, outliers)
+        if not fit.p_value < MISFIT:
+            warnings += term.instability(fit.values)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
     warnings += because.values()
     for name, estimate in fit.parameters.items():

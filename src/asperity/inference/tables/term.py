@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from asperity.arrays import Bool, Float
+from asperity.errors import named
 from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
 from asperity.inference.tables.residuals import (
     Prediction,
@@ -52,6 +53,8 @@ _LEAST_SHARE = 0.5
 #: minimisations reached the minimum with it, and none of 26 with the uncertainties of the table
 #: (`benchmarks.random_truths --slow`, seed 207 of linker-dieterich).
 _SMOOTHING = 0.3
+#: Growth of a perturbation in a period above which a response is never read: by e in 100 periods.
+_UNSTABLE = 0.01
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
 #: A warning names a reading if its uncertainty, absolute and relative to the reading, is below the
@@ -314,6 +317,24 @@ class LockInTerm(DataTerm):
                         f"uncertainties without phase{n}: an amplitude so small is biased upwards"
                     )
         return sentences
+
+    def instability(self, values: Mapping[str, float]) -> list[str]:
+        """As in `DataTerm`: rows whose response is unstable."""
+        function = self._functions["coarse"]
+        growth = function.growth(parameters_at(self.fixed, values, function), self._nearest(values))
+        rows = np.flatnonzero(np.nan_to_num(growth) > _UNSTABLE)
+        if not rows.size:
+            return []
+        worst = rows[np.argmax(growth[rows])]
+        most = growth[worst]
+        times = f"{math.exp(most):.3g}" if most < 100 else f"10^{most / math.log(10):.0f}"
+        return [
+            f"with these estimates the response of {rows.size} of {growth.size} rows is unstable, "
+            f"most of all that of {self.table.row_names[worst]} (a perturbation grows {times} times "
+            "in a period): the slider would stick and slip there, and could not be read. The true "
+            "values lie elsewhere in the intervals; take more observables or points, or give "
+            f"{named('D0')} or {named('K')} a prior"
+        ]
 
     def _small_errors(self, residuals: Residuals, information: Float) -> list[str]:
         """Sentences on readings that decide the fit by uncertainties far below the others."""

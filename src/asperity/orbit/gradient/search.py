@@ -22,7 +22,7 @@ from asperity.arrays import Bool, Complex, Float, Index
 from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
+from asperity.orbit.mesh.equations import collocated, mean_and_harmonics, read_orbit
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
@@ -334,6 +334,28 @@ def search_orbits(
         if len(periodic) >= (len(rows) if every else 1):
             follow(settled, periodic)
     return result
+
+
+def growth_of(
+    equations: ParametrisedProblem, parameters: dict[str, Float], known: KnownOrbits | None
+) -> Float:
+    """Growth of perturbations in a period at orbits of a coarse search, shape (points,).
+
+    The arguments are those of `search_orbits`. The growth is ln |m| of the largest multiplier m,
+    on `FIRST_MESH` intervals; NaN without an orbit.
+    """
+    problem = jax.tree.map(np.asarray, equations.problem(parameters))
+    growth = np.full(len(problem.system.V), np.nan)
+    all_points = np.ones(growth.size, bool)
+    found = search_orbits(
+        equations, 1, parameters, all_points, direct=True, coarse=True, known=known
+    )
+    read, chunk = partial(read_orbit, harmonics=1), mesh_chunk(problem.system.size)
+    for index, orbits in found.parts:
+        inputs, rows = (take(problem, index), orbits.orbit), np.arange(len(index))
+        for part, observables in run_chunks(read, inputs, rows, chunk):
+            growth[index[part]] = observables.log_multipliers[0].real
+    return growth
 
 
 def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
