@@ -330,7 +330,7 @@ class LockInTerm(DataTerm):
         times = f"{math.exp(most):.3g}" if most < 100 else f"10^{most / math.log(10):.0f}"
         return [
             f"with these estimates the response of {rows.size} of {growth.size} rows is unstable, "
-            f"most of all that of {self.table.row_names[worst]} (a perturbation grows {times} times "
+            f"most of all that of {self.table.row_names[worst]} (perturbations grow {times} times "
             "in a period): the slider would stick and slip there, and could not be read. The true "
             "values lie elsewhere in the intervals; take more observables or points, or give "
             f"{named('D0')} or {named('K')} a prior"
