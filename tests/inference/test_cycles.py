@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 import asperity as asp
 from asperity.errors import InputError
-from asperity.inference import Prior
+from asperity.inference import Prior, compare
 from asperity.inference.answers import read_data
 from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
@@ -196,3 +196,18 @@ def test_a_stiffness_over_the_load_is_one_of_the_cycle():
     assert result.values["K"] == pytest.approx(600.0, rel=0.03)
     with pytest.raises(InputError, match=r"prior\['K'\] must be in N/m or 1/m"):
         fit(cycle, "rice-ruina", ["K"], prior={"K": replace(prior, unit="Pa/m")}, **ask)
+
+
+@pytest.mark.long
+def test_laws_are_compared_with_all_that_a_cycle_determines():
+    """B, the stiffness and the mass are free without being named."""
+    cycle = averaged_cycle(measured(5, noise=0.002))
+    fixed = {"A": LAW["A"], "D0": LAW["D0"]}
+    comparison = compare(cycle, ["rice-ruina", "ruina-slip"], fixed=fixed, starts=2, evidence=False)
+    assert comparison.best == "rice-ruina"
+    assert comparison.laws["ruina-slip"].excluded
+    found = comparison.laws["rice-ruina"].fit
+    assert list(found.parameters) == ["B", "K", "M"]
+    for name, estimate in found.parameters.items():
+        low, high = estimate.interval_95
+        assert low < TRUTH[name] < high

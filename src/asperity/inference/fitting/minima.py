@@ -41,6 +41,10 @@ _RARE, _WITH_SEARCH = 1 / 16, 32
 #: and with searched orbits. A start of the 600 fast tables leads to the minimum in 3 of 4 cases, in
 #: the worst table in 1 of 12.
 _FURTHER, _FURTHER_WITH_SEARCH = 32, 6
+#: A lowest minimum that so many starts have led to, and at which the law is far off, is final. Of
+#: NNN such fits further starts would lead lower in NN, and none of those to a law that is not far
+#: off.
+_CONFIRMED = 3
 #: Rows with which starts are compared.
 _SCREENED_ROWS = 8
 #: Rows of the coarse objective (one chunk of the search for orbits), and the smallest number of
@@ -130,13 +134,15 @@ def _by_solved_rows(
         if _describes(objective, beyond, ends):
             return beyond
         objective.use_search(False)
-    for k, start in enumerate(_further(objective, drawn, chi2, starts)[:_FURTHER]):
-        if _describes(objective, minima, ends):
+    for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
+        if _describes(objective, minima, ends) or _certainly_far_off(partial, ends):
             break
-        new = _from_further_start(partial, start, smoothly=k % 2 > 0)
-        if math.isfinite(new.chi2) and _is_new(new, ends):
-            ends = sorted([*ends, new], key=_CHI2)
+        new = _from_further_start(partial, start)
+        if not math.isfinite(new.chi2):
+            continue
+        if _is_new(new, ends):
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
+        ends = sorted([*ends, new], key=_CHI2)
     minima = distinct(minima)
     far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
@@ -175,15 +181,11 @@ def _further(
     return [u for u in order if u.tobytes() not in taken]
 
 
-def _from_further_start(objective: Objective, start: Float, *, smoothly: bool) -> Minimum:
-    """The rough minimum from a start, optionally by way of that with larger uncertainties."""
-    if smoothly:
-        start = (
-            objective.smoother()
-            .minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS // 2)
-            .u
-        )
-    return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+def _from_further_start(objective: Objective, start: Float) -> Minimum:
+    """The rough minimum from a start, by way of that with larger uncertainties."""
+    smoother, half = objective.smoother(), _EVALUATIONS // 2
+    between = smoother.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=half).u
+    return objective.minimise(between, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
 
 
 def _describes(
@@ -273,9 +275,9 @@ def _by_few_rows(
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
-        if _describes(coarse, roughly):
+        if _describes(coarse, roughly) or _certainly_far_off(coarse, roughly):
             break
-        new = _from_further_start(coarse, start, smoothly=True)
+        new = _from_further_start(coarse, start)
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
     # A law that is far off for few rows does not describe all of them.
@@ -450,6 +452,12 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
 def _far_off(objective: Objective, minimum: Minimum) -> bool:
     """Whether the law is far from describing the data at a minimum."""
     return _p_value(objective, minimum) < FAR_OFF
+
+
+def _certainly_far_off(objective: Objective, ends: Sequence[Minimum]) -> bool:
+    """Whether a law is far off at the lowest minimum, which several starts have led to."""
+    reached = sum(_apart(end, ends[0]) < _SAME_COARSE for end in ends)
+    return reached >= _CONFIRMED and _far_off(objective, ends[0])
 
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:
