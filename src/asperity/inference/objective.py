@@ -231,9 +231,6 @@ class DataTerm(ABC):
     def use_search(self, always: bool) -> None:  # noqa: B027
         """Set whether every call tries the slower method, for data that have one."""
 
-    def search_wholly(self, values: Mapping[str, float]) -> None:  # noqa: B027
-        """Search for solutions at `values` by all methods; later calls start from them."""
-
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
@@ -397,12 +394,6 @@ class Objective:
         """Set whether every call tries the slower method of the terms."""
         for term in self.terms:
             term.use_search(always)
-        self.forget()
-
-    def search_wholly(self, u: Float) -> None:
-        """Search for solutions of all terms at u by all methods; later calls start from them."""
-        for term in self.terms:
-            term.search_wholly(self.named(u))
         self.forget()
 
     def minimise(

@@ -569,9 +569,6 @@ class NarrowRows(Rows):
 
     lonely = 5
 
-    def search_wholly(self, values):
-        """No method finds more orbits."""
-
     def with_rows(self, kept, coarse=False):
         part = NarrowRows(self.values, 0, self.kept[kept], self.computed)
         part.searching = True

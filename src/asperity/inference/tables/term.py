@@ -123,7 +123,7 @@ class LockInTerm(DataTerm):
         # Programs are compiled for the whole table, and used for any of its rows.
         function = partial(response_function, law, **self.motion, least_points=table.rows)
         self._functions: dict[bool | str, ResponseFunction] = {
-            way: function(search=way) for way in (False, "direct", "coarse", True)
+            way: function(search=way) for way in (False, "direct", "coarse")
         }
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.coarse, self.least = False, 1.0
@@ -230,17 +230,6 @@ class LockInTerm(DataTerm):
     def use_search(self, always: bool) -> None:
         """As in `DataTerm`; the slower method searches for orbits."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
-
-    def search_wholly(self, values: Mapping[str, float]) -> None:
-        """As in `DataTerm`."""
-        direct, known = self._functions["direct"], self._nearest(values)
-        given = parameters_at(self.fixed, values, direct)
-        left = np.flatnonzero(np.asarray(direct(given, known).outcome) != Outcome.CONVERGED)
-        if 0 < left.size <= _LEAST_SHARE * self.table.rows:
-            missed = known.picked(left)
-            self._functions[True]({n: v[left] for n, v in given.items()}, missed)
-            known.complete(missed, left)
-        self._visited.append((dict(values), known))
 
     def coarser(self) -> LockInTerm:
         """As in `DataTerm`; both terms share their orbits."""

@@ -154,19 +154,16 @@ class KnownOrbits:
         for part, kept in run_chunks(remesh, inputs, points, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
-    def complete(
-        self, other: KnownOrbits, index: Index | None = None, *, near: bool = False
-    ) -> None:
-        """Copy orbits from `other` to the points without one; `index` are the points of `other`."""
-        rows = np.arange(self.points) if index is None else index
-        new = np.flatnonzero(other.known & ~self.known[rows])
+    def complete(self, other: KnownOrbits, *, near: bool = False) -> None:
+        """Copy orbits of the same points from `other` to those without one."""
+        new = np.flatnonzero(other.known & ~self.known)
         if other.orbit is None or not len(new):
             return
         if self.orbit is None:
             size, intervals, _ = other.orbit.nodes.shape
             self.orbit = Orbit.empty(other.orbit.scheme, size, intervals, self.points)
-        put(self.orbit, rows[new], take(other.orbit, new))
-        self.known[rows[new]], self.near[rows[new]] = True, near
+        put(self.orbit, new, take(other.orbit, new))
+        self.known[new], self.near[new] = True, near
 
     def picked(self, index: Index) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
