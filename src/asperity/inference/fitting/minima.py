@@ -41,8 +41,8 @@ _RARE, _WITH_SEARCH = 1 / 16, 32
 #: and with searched orbits. A start of the 600 fast tables leads to the minimum in 3 of 4 cases, in
 #: the worst table in 1 of 12.
 _FURTHER, _FURTHER_WITH_SEARCH = 32, 6
-#: A lowest minimum that so many starts have led to, and at which the law is far off, is final. Of 50
-#: such fits further starts would lead lower in 11, and in none to a law that is not far off; of
+#: A lowest minimum that so many starts have led to, and at which the law is far off, is final. Of
+#: 50 such fits further starts would lead lower in 11, in none to a law that is not far off; of
 #: 2,144 further starts of 188 fits, 932 are left out.
 _CONFIRMED = 3
 #: Rows with which starts are compared.
