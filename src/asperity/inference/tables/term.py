@@ -321,8 +321,8 @@ class LockInTerm(DataTerm):
             f"with these estimates the response of {rows.size} of {growth.size} rows is unstable, "
             f"most of all that of {self.table.row_names[worst]} (perturbations grow {times} times "
             "in a period): the slider would stick and slip there, and could not be read. The true "
-            "values lie elsewhere in the intervals; take more observables or points, or give "
-            f"{named('D0')} or {named('K')} a prior"
+            "values lie elsewhere in the intervals, or a fixed number is wrong: check "
+            f"{named('K')} and {named('D0')}, or take more observables or points"
         ]
 
     def _small_errors(self, residuals: Residuals, information: Float) -> list[str]:
