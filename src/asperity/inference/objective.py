@@ -195,8 +195,14 @@ class DataTerm(ABC):
         """
         return None
 
-    def coarser(self) -> DataTerm:
-        """The same data with a coarser model, for the approach to a minimum; itself without one."""
+    def coarser(self, *, partly: bool = True) -> DataTerm:
+        """The same data with a coarser model, for the approach to a minimum; itself without one.
+
+        Parameters
+        ----------
+        partly : bool
+            Whether half of the data may have no solution, as in `partial`.
+        """
         return self
 
     def partial(self) -> DataTerm:
@@ -478,9 +484,9 @@ class Objective:
         point[moving] = end
         return Minimum(point, self.chi2(point))
 
-    def coarser(self) -> Objective:
+    def coarser(self, *, partly: bool = True) -> Objective:
         """The objective of `DataTerm.coarser` data; itself without a coarser model."""
-        return self._of([term.coarser() for term in self.terms])
+        return self._of([term.coarser(partly=partly) for term in self.terms])
 
     def partial(self) -> Objective:
         """The objective of `DataTerm.partial` data; itself without these."""

@@ -140,6 +140,7 @@ class ResponseFunction:
         parameters: Mapping[str, ArrayLike],
         known: KnownOrbits | None = None,
         *,
+        motions: bool | None = None,
         every: bool = False,
         names: Collection[str] | None = None,
     ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
@@ -149,6 +150,7 @@ class ResponseFunction:
         ----------
         parameters : mapping of str to array
         known : KnownOrbits, optional
+        motions : bool, optional
             As for a call.
         every : bool
             Whether the result is needed only if every point has a response, as in a fit. The search
@@ -166,7 +168,7 @@ class ResponseFunction:
             share is the sum over the points.
         """
         padded, points = self._padded(parameters)
-        orbits = self._orbits(padded, points or 1, known, every=every)
+        orbits = self._orbits(padded, points or 1, known, every=every, motions=motions)
         table: Any
         whole, table = _differentiate(padded, orbits.fast, orbits.wanted, program=orbits.program)
         whole = _with_searched(whole, orbits)

@@ -351,14 +351,19 @@ class Profile:
         search: bool,
         most: float = math.inf,
     ) -> None:
-        self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
-        self.search = search
-        self.most = objective.unsolved + most
+        self.whole, self.i, self.u, self.chi2 = objective, i, u, chi2
+        self.search, self.most = search, most
+        self._coarsen()
         # A step is at most a factor of e: the approximation may fail further away.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
         self._unsolved: set[float] = set()
+
+    def _coarsen(self) -> None:
+        # Errors of coarse orbits are far below the accuracy of an end.
+        self.objective = self.whole.coarser(partly=False)
+        self.unsolved = self.objective.unsolved + self.most
 
     @property
     def lowest(self) -> tuple[Float, float]:
@@ -412,7 +417,8 @@ class Profile:
                     # The fast method fails beyond this value; this is no statement about the data.
                     if not self.search:
                         return sign * math.inf
-                    self.objective.use_search(True)
+                    self.whole.use_search(True)
+                    self._coarsen()
                     self._unsolved.clear()
                     return self._end(level, wider, sign)
                 return end
@@ -455,7 +461,7 @@ class Profile:
         """Minimise over all other coordinates at x; whether this succeeded."""
         nearest = min(self.path, key=lambda known: abs(known - x))
         for begin in (self._start(x), self.path[nearest][0]):
-            if self.objective.searches and self.objective.unsolved > self.most:
+            if self.objective.searches and self.objective.unsolved > self.unsolved:
                 raise ProfileAtEdgeError
             result, value = self.objective.minimise(
                 begin, {self.i: x}, tolerance=_TOLERANCE, negligible=_NEGLIGIBLE

@@ -140,7 +140,7 @@ def _by_solved_rows(
         new = _from_further_start(partial, start)
         if not math.isfinite(new.chi2):
             continue
-        if _is_new(new, ends):
+        if _is_new(new, ends) and not (minima and new.chi2 > minima[0].chi2 + _CONTINUED):
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
         ends = sorted([*ends, new], key=_CHI2)
     minima = distinct(minima)

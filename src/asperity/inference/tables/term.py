@@ -231,11 +231,11 @@ class LockInTerm(DataTerm):
         """As in `DataTerm`; the slower method searches for orbits."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
 
-    def coarser(self) -> LockInTerm:
+    def coarser(self, *, partly: bool = True) -> LockInTerm:
         """As in `DataTerm`; both terms share their orbits."""
         if not self.searches or self.coarse:
             return self
-        result = self.partial()
+        result = self.partial() if partly else copy(self)
         result.coarse = True
         return result
 
@@ -372,7 +372,9 @@ class LockInTerm(DataTerm):
         given = parameters_at(self.fixed, free, function)
         known = self._nearest(free) if search else None
         wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
-        values, slopes = function.value_and_jacobian(given, known, every=every, names=wanted)
+        values, slopes = function.value_and_jacobian(
+            given, known, motions=every or None, every=every, names=wanted
+        )
         if known is not None and np.mean(values.outcome == Outcome.CONVERGED) >= self.least:
             self._visited.append((dict(free), known))
             del self._visited[: -max(4, _REMEMBERED // self.table.rows)]
