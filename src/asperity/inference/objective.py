@@ -392,6 +392,11 @@ class Objective:
         data = self.data_residuals(u)
         return -math.inf if data is None else float(sum(log_density(d) for d in data))
 
+    def instability(self, u: Float) -> list[str]:
+        """Sentences on data that are no measurement at u: `DataTerm.instability` of all terms."""
+        values = self.named(u)
+        return [sentence for term in self.terms for sentence in term.instability(values)]
+
     def forget(self) -> None:
         """Forget the last evaluations: a term has changed."""
         self._last.clear()

@@ -160,6 +160,36 @@ def test_both_minima_are_found_and_intervals_span_them():
     assert any("another minimum" in w and "D0" in w for w in result.warnings)
 
 
+@pytest.mark.parametrize("unstable", [FIRST, SECOND])
+def test_a_minimum_with_a_stable_response_comes_before_an_equal_one_without(unstable, monkeypatch):
+    """Also if chi-squared is lower by 4 where the response is unstable, but not by 16."""
+
+    def instability(self, values):
+        return ["unstable"] if abs(math.log(values["D0"]) - unstable) < 0.3 else []
+
+    monkeypatch.setattr(Formula, "instability", instability)
+    stable = FIRST + SECOND - unstable
+    for rise, expected in ((0.0, stable), (4.0, stable), (16.0, unstable)):
+
+        def values(x, rise=rise):
+            r, slope = two_minima(x)
+            # The square of a residual is lower by `rise` at the unstable minimum.
+            well = rise * math.exp(-((x - unstable) ** 2) / 0.18)
+            r[1] = math.sqrt(25.0 + rise - well)
+            slope[1] = well * (x - unstable) / 0.09 / r[1]
+            return r, slope
+
+        objective = objective_of(values, 1.8e-6)
+        result = described_fit(objective, minima_of(objective, 0), profile=False)
+        assert math.log(result.values["D0"]) == pytest.approx(expected, abs=0.1)
+        assert ("unstable" in result.warnings) == (expected == unstable)
+        if expected == stable:
+            assert not result.optima
+        low, high = np.log(result.parameters["D0"].interval_68)
+        assert low < expected < high
+        assert not low < FIRST + SECOND - expected < high
+
+
 def test_a_narrow_minimum_at_another_memory_length_is_found():
     """Random starts have lower chi-squared at the wide minimum, which describes the data too."""
     narrow = FIRST + math.log(10.0) + 0.1

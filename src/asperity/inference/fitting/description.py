@@ -141,7 +141,9 @@ def described_fit(
         if along is not None and along.lowest[1] < at.chi2 - _LOWER:
             # The search has missed a minimum: describe the fit again from this minimum.
             missed = objective.minimise(along.lowest[0])
-            return described_fit(objective, [missed, *minima], profile=profile, described=described)
+            if not objective.instability(missed.u) or objective.instability(at.u):
+                minima = [missed, *minima]
+                return described_fit(objective, minima, profile=profile, described=described)
         estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
         if described is not None:
             described(i + 1)
@@ -192,10 +194,7 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
 def _ends(
     objective: Objective, at: Parabola, i: int, along: Profile | None
 ) -> list[tuple[float, float]]:
-    """Intervals of a coordinate, one for each level.
-
-    Intervals by a profile stop at the first that leads to a lower minimum.
-    """
+    """Intervals of a coordinate, one for each level."""
     low, high = objective.unknowns[i].bounds
     ends = []
     for level in LEVELS:
@@ -204,8 +203,6 @@ def _ends(
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
             ends.append(along.interval(level, wider))
-            if along.lowest[1] < at.chi2 - _LOWER:
-                break
         elif at.missing[i] or at.stopped:
             ends.append((low, high))
         else:
@@ -486,8 +483,8 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
     information = np.sum([J.T @ J for J in slopes], axis=0)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         warnings += term.warnings(residuals, information, outliers)
-        if not fit.p_value < MISFIT:
-            warnings += term.instability(fit.values)
+    if not fit.p_value < MISFIT:
+        warnings += fit.objective.instability(u)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
     warnings += because.values()
     for name, estimate in fit.parameters.items():

@@ -110,7 +110,7 @@ def minima_of(
     if not minima:
         objective.use_search(True)
         minima = _by_few_rows(objective, drawn_starts, special, progress)
-    return _with_other_lengths(objective, minima)
+    return _readable(objective, _with_other_lengths(objective, minima))
 
 
 def _by_solved_rows(
@@ -380,6 +380,18 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
                 u = min(apart, key=_CHI2).u
                 others.append(_minimised_near(objective, u, [*minima, *others]))
     return sorted([*minima, *others], key=_CHI2)
+
+
+def _readable(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
+    """Minima without those at which some response is unstable, if the data allow others."""
+    allowed = [m.chi2 <= minima[0].chi2 + RIVAL for m in minima]
+    if sum(allowed) < 2 or _far_off(objective, minima[0]):
+        return minima
+    stable = [
+        near and not objective.instability(m.u) for m, near in zip(minima, allowed, strict=True)
+    ]
+    kept = [m for m, near, good in zip(minima, allowed, stable, strict=True) if good or not near]
+    return kept if any(stable) else minima
 
 
 def _minimised_near(
