@@ -348,6 +348,24 @@ def test_the_minimum_next_to_the_truth_is_found(drawn):
     assert result.p_value > 0.01
 
 
+@pytest.mark.long
+def test_ends_of_profiles_with_searched_orbits_have_the_rise_of_their_level():
+    """Chi-squared of exact orbits, minimised at each end, is 1 and 3.84 above the minimum."""
+    law = "rice-ruina"
+    response = response_function(get_law(law), search="direct")
+    truth, fixed, table = drawn_table(103, law, response, slow_point)
+    result = fit(table, law, list(truth), fixed=fixed, profile=True)
+    objective = result.objective
+    assert objective.searches
+    u = objective.coordinates(result.values)
+    for i, unknown in enumerate(objective.unknowns):
+        estimate = result.parameters[unknown.name]
+        for ends, rise in ((estimate.interval_68, 1.0), (estimate.interval_95, 3.8415)):
+            for end in ends:
+                there = objective.minimise(u, {i: float(unknown.to_coordinate(end))})
+                assert there.chi2 - result.chi2 == pytest.approx(rise, rel=0.02)
+
+
 @pytest.mark.parametrize(
     "start", population([("--start", "eps_ratio=0.5", "--start", "lambda=0.6 um"), ()])
 )

@@ -363,7 +363,7 @@ class Profile:
     def _coarsen(self) -> None:
         # Errors of coarse orbits are far below the accuracy of an end.
         self.objective = self.whole.coarser(partly=False)
-        self.unsolved = self.objective.unsolved + self.most
+        self.last_unsolved = self.objective.unsolved + self.most
 
     @property
     def lowest(self) -> tuple[Float, float]:
@@ -461,7 +461,7 @@ class Profile:
         """Minimise over all other coordinates at x; whether this succeeded."""
         nearest = min(self.path, key=lambda known: abs(known - x))
         for begin in (self._start(x), self.path[nearest][0]):
-            if self.objective.searches and self.objective.unsolved > self.unsolved:
+            if self.objective.searches and self.objective.unsolved > self.last_unsolved:
                 raise ProfileAtEdgeError
             result, value = self.objective.minimise(
                 begin, {self.i: x}, tolerance=_TOLERANCE, negligible=_NEGLIGIBLE

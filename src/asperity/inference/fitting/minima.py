@@ -385,7 +385,7 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
 def _readable(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
     """Minima without those at which some response is unstable, if the data allow others."""
     allowed = [m.chi2 <= minima[0].chi2 + RIVAL for m in minima]
-    if sum(allowed) < 2 or _far_off(objective, minima[0]):
+    if sum(allowed) < 2 or not objective.has_table or _far_off(objective, minima[0]):
         return minima
     stable = [
         near and not objective.instability(m.u) for m, near in zip(minima, allowed, strict=True)
