@@ -334,15 +334,16 @@ def test_a_row_at_the_edge_of_periodic_sliding_is_no_outlier():
     "drawn",
     population(
         [
+            ("linker-dieterich", 27, fast_point),
+            ("linker-dieterich", 51, fast_point),
+            ("linker-dieterich", 23, fast_point),
             ("elasto-plastic", 111, fast_point),
-            *(("linker-dieterich", seed, fast_point) for seed in (12, 23, 27, 51)),
-            ("elasto-plastic", 161, fast_point),
-            ("linker-dieterich", 207, slow_point),
+            ("linker-dieterich", 13, slow_point),
         ]
     ),
 )
 def test_the_minimum_next_to_the_truth_is_found(drawn):
-    """Tables for which the best starts lead to other minima, or some rows need a search."""
+    """Tables for which the best starts lead elsewhere: to other minima, or where no row is read."""
     law, seed, point = drawn
     response = response_function(get_law(law), search="direct" if point is slow_point else False)
     truth, fixed, table = drawn_table(seed, law, response, point)

@@ -49,9 +49,8 @@ _NEAR = 0.1
 #: Smallest share of rows with an orbit in the coarse model: some rows may have slip events, whose
 #: orbits this model does not reach, even at the minimum.
 _LEAST_SHARE = 0.5
-#: Relative uncertainty with which chi-squared is smooth: for a table of slow modulation 8 of 12
-#: minimisations reached the minimum with it, and none of 26 with the uncertainties of the table
-#: (`benchmarks.random_truths --slow`, seed 207 of linker-dieterich).
+#: Relative uncertainty with which chi-squared is smooth: without it the minimum of one of 62 tables
+#: of slow modulation is missed (`benchmarks.random_truths --slow`, seed 13 of linker-dieterich).
 _SMOOTHING = 0.3
 #: Growth of a perturbation in a period above which a response is never read: by e in 100 periods.
 _UNSTABLE = 0.01
