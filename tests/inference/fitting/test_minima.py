@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.inference.fitting import minima
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.estimated_noise import with_noise
 from asperity.inference.fitting.intervals import Profile
@@ -211,29 +210,6 @@ def test_a_narrow_minimum_at_another_memory_length_is_found():
     low, high = np.log(result.parameters["D0"].interval_95)
     assert low < FIRST
     assert high > narrow
-
-
-def test_a_law_that_is_far_off_at_a_minimum_of_many_starts_is_not_started_again(monkeypatch):
-    """Chi-squared of 9,900 at the only minimum, and on a plateau where every start is an end."""
-    started = []
-    again = minima._from_further_start
-    monkeypatch.setattr(
-        minima, "_from_further_start", lambda *a, **k: started.append(0) or again(*a, **k)
-    )
-
-    def far_off(x):
-        r, slope = one_minimum(x)
-        return 10 * r, 10 * slope
-
-    (end, *_) = minima_of(objective_of(far_off, 5e-7), 0)
-    assert end.chi2 == pytest.approx(9900)
-    assert not started
-
-    def plateau(x):
-        return np.full(100, 10.0 + 1e-9 * x), np.full(100, 1e-9)
-
-    minima_of(objective_of(plateau, 5e-7), 0)
-    assert len(started) > 8
 
 
 def one_minimum(x):

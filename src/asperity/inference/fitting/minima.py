@@ -41,10 +41,6 @@ _RARE, _WITH_SEARCH = 1 / 16, 32
 #: and with searched orbits. A start of the 600 fast tables leads to the minimum in 3 of 4 cases, in
 #: the worst table in 1 of 12.
 _FURTHER, _FURTHER_WITH_SEARCH = 32, 6
-#: A lowest minimum that so many starts have led to, and at which the law is far off, is final. Of
-#: 50 such fits further starts would lead lower in 11, in none to a law that is not far off; of
-#: 2,144 further starts of 188 fits, 932 are left out.
-_CONFIRMED = 3
 #: Rows with which starts are compared.
 _SCREENED_ROWS = 8
 #: Rows of the coarse objective (one chunk of the search for orbits), and the smallest number of
@@ -135,14 +131,12 @@ def _by_solved_rows(
             return beyond
         objective.use_search(False)
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
-        if _describes(objective, minima, ends) or _certainly_far_off(partial, ends):
+        if _describes(objective, minima, ends):
             break
         new = _from_further_start(partial, start)
-        if not math.isfinite(new.chi2):
-            continue
-        if _is_new(new, ends) and not (minima and new.chi2 > minima[0].chi2 + _CONTINUED):
+        if math.isfinite(new.chi2) and _is_new(new, ends):
+            ends = sorted([*ends, new], key=_CHI2)
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
-        ends = sorted([*ends, new], key=_CHI2)
     minima = distinct(minima)
     far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
@@ -275,7 +269,7 @@ def _by_few_rows(
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
-        if _describes(coarse, roughly) or _certainly_far_off(coarse, roughly):
+        if _describes(coarse, roughly):
             break
         new = _from_further_start(coarse, start)
         if math.isfinite(new.chi2):
@@ -460,12 +454,6 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
 def _far_off(objective: Objective, minimum: Minimum) -> bool:
     """Whether the law is far from describing the data at a minimum."""
     return _p_value(objective, minimum) < FAR_OFF
-
-
-def _certainly_far_off(objective: Objective, ends: Sequence[Minimum]) -> bool:
-    """Whether a law is far off at the lowest minimum, which several starts have led to."""
-    reached = sum(_apart(end, ends[0]) < _SAME_COARSE for end in ends)
-    return reached >= _CONFIRMED and _far_off(objective, ends[0])
 
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:
