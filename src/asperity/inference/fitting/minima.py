@@ -133,7 +133,7 @@ def _by_solved_rows(
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
         if _describes(objective, minima, ends):
             break
-        new = _from_further_start(partial, start)
+        new = partial.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
         if math.isfinite(new.chi2) and _is_new(new, ends):
             ends = sorted([*ends, new], key=_CHI2)
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
@@ -175,7 +175,7 @@ def _further(
     return [u for u in order if u.tobytes() not in taken]
 
 
-def _from_further_start(objective: Objective, start: Float) -> Minimum:
+def _by_way_of_smoother(objective: Objective, start: Float) -> Minimum:
     """The rough minimum from a start, by way of that with larger uncertainties."""
     smoother, half = objective.smoother(), _EVALUATIONS // 2
     between = smoother.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=half).u
@@ -271,7 +271,7 @@ def _by_few_rows(
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
         if _describes(coarse, roughly):
             break
-        new = _from_further_start(coarse, start)
+        new = _by_way_of_smoother(coarse, start)
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
     # A law that is far off for few rows does not describe all of them.
