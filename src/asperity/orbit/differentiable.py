@@ -205,8 +205,15 @@ class ResponseFunction:
         -------
         array, shape (points,)
             NaN where the search finds no orbit.
+
+        Raises
+        ------
+        InputError
+            As for a call.
         """
         padded, points = self._padded(parameters)
+        if known is not None:
+            self._check_known(known, points or 1, traced=_traced(padded))
         numbers = {n: np.asarray(v)[: points or 1] for n, v in padded.items()}
         return growth_of(self.equations, numbers, known)
 
