@@ -157,7 +157,8 @@ class Jobs:
         for worker in self._alive:
             worker.kill()
         while self._tasks:  # a task that ends may start another task
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+            # `gather` of tasks that have all ended would not let the loop remove them from the set.
+            await asyncio.wait(self._tasks)
         for worker in self._alive:  # a worker may have started in the meantime
             worker.kill()
         await asyncio.gather(*(worker.ended() for worker in self._alive))

@@ -141,6 +141,9 @@ def server_on(
         server_header=False,
         date_header=False,
         http=Connection,
+        # uvloop, which uvicorn takes where it is installed, starts workers by a plain fork; JAX warns
+        # of that.
+        loop="asyncio",
         ws="none",
         lifespan="on",
         timeout_keep_alive=HEAD_PAUSE,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import stat
@@ -207,6 +208,8 @@ def output_files(
 def _resolved(path: str | os.PathLike[str], name: str, example: str) -> Path:
     try:
         target = Path(path).resolve()
+        if target.is_symlink():  # of a circle; an error of `resolve` itself before Python 3.13
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         target.exists()
         os.fsencode(target)
     except (OSError, ValueError, RuntimeError, TypeError) as error:
