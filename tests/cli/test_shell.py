@@ -1,6 +1,7 @@
 """The command itself: what it costs, how it helps, how it leaves."""
 
 import importlib
+import inspect
 import os
 import re
 import signal
@@ -15,7 +16,9 @@ import pytest
 import asperity.cli.response
 from asperity import __version__
 from asperity.cli.main import main
+from asperity.cli.options import FieldOption
 from asperity.cli.shell import Shell
+from asperity.questions.fit import Estimation, Fit, FitOptions
 from references.commands import refused
 
 HEAVY = ("jax", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
@@ -104,6 +107,18 @@ def test_every_option_says_what_it_does(command: str) -> None:
         if isinstance(option, click.Option) and not option.hidden:
             assert shown is not None
             assert re.search(r"[A-Za-z]{2}", shown[1].split("[default")[0]), option.opts
+
+
+def test_help_of_fields_does_not_depend_on_the_indentation_of_docstrings(monkeypatch) -> None:
+    """Python 3.13 and later remove it."""
+    context = click.Context(click.Command("fit"))
+    option = FieldOption(["--free"], record="asperity.questions.fit:Fit")
+    before = option.get_help_record(context)
+    for record in (Estimation, FitOptions, Fit):
+        monkeypatch.setattr(record, "__doc__", inspect.cleandoc(record.__doc__))
+    assert "\nfree :" in Estimation.__doc__
+    assert option.get_help_record(context) == before
+    assert before[1]
 
 
 def test_an_unknown_command_names_the_nearest(asperity) -> None:

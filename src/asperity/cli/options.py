@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 from collections.abc import Callable, Iterable
 from functools import reduce, wraps
@@ -90,8 +91,8 @@ class FieldOption(OnceOption):
         record = getattr(importlib.import_module(module), name)
         about = record.model_fields[self.name]
         # The field and its type in a line, and the text below.
-        entry = re.compile(rf"^    {self.name} : .*\n((?:        .*\n)+)", re.MULTILINE)
-        entries = (entry.search(one.__doc__ or "") for one in record.__mro__)
+        entry = re.compile(rf"^{self.name} : .*((?:\n    .*)+)", re.MULTILINE)
+        entries = (entry.search(inspect.cleandoc(one.__doc__ or "")) for one in record.__mro__)
         self.help = next((" ".join(text[1].split()) for text in entries if text), "")
         if about.default is not None and not self.is_flag:
             self.default, self.show_default = about.default, True
