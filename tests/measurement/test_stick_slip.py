@@ -345,6 +345,14 @@ def test_the_catalogue_holds_every_event(ending, tmp_path) -> None:
     assert drops == pytest.approx(result.events.drop.tolist(), rel=1e-9)
 
 
+def test_measured_slips_are_written_as_a_row_of_a_table(tmp_path) -> None:
+    result = measure_stick_slip(recorded(saw(0, events=20).force))
+    path = asp.write([result, result], tmp_path / "rows.nc")
+    with xr.open_dataset(path, engine="h5netcdf") as table:
+        assert table["regime"].values.tolist() == ["regular stick-slip"] * 2
+        assert table["drop"].values == pytest.approx(np.mean(result.events.drop))
+
+
 def test_a_catalogue_of_another_format_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="must be a CSV, NetCDF or JSON file"):
         write_catalogue(measure_stick_slip(recorded(saw(0, events=5).force)), tmp_path / "e.txt")

@@ -42,11 +42,13 @@ def measured_rows(path: Path, measurement: Any) -> list[Row]:
     Parameters
     ----------
     path : Path
-    measurement : SlidingMeasurement, StickSlipMeasurement, or list of Measurement or InputError
+    measurement : a measurement of any kind, or a list of Measurement or InputError
         A list holds the modulated stretches.
     """
     if isinstance(measurement, list):
         return modulated_rows(path, measurement)
+    if hasattr(measurement, "reading"):
+        return modulated_rows(path, [measurement])
     if hasattr(measurement, "regimes"):
         return [stick_slip_row(path, measurement)]
     return sliding_rows(path, measurement)

@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from asperity.errors import InputError, require
-from asperity.measurement.campaign import Row, modulated_rows, sliding_rows, table_file, write_rows
+from asperity.measurement.campaign import table_file, write_rows
 from asperity.measurement.measure import Measurement
+from asperity.measurement.report import measured_rows
 from asperity.measurement.sliding.measure import SlidingMeasurement
+from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 from asperity.parameters.arguments import FilePath, typed
 from asperity.recording import Trace
 from asperity.recording.writers import write as write_recording
 
-Measured = Measurement | SlidingMeasurement
+Measured = Measurement | SlidingMeasurement | StickSlipMeasurement
 
 
 @typed
@@ -27,9 +29,10 @@ def write(
 
     Parameters
     ----------
-    data : Trace, Measurement or SlidingMeasurement, or a list of measurements
+    data : Trace, Measurement, SlidingMeasurement or StickSlipMeasurement, or a list of measurements
         A recording, or what `asperity.measure` returns of one or of several. A table has a row for
-        each modulated stretch, velocity step and hold, in SI, as ``asperity measure --out`` has.
+        each modulated stretch, velocity step, hold and recording of stick-slip, in SI, as
+        ``asperity measure --out`` has.
     path : str or path
         Path of a recording (``.csv``, ``.txt``, ``.h5`` or ``.tdms``) or table (``.csv`` or
         ``.nc``).
@@ -59,13 +62,8 @@ def write(
         raise InputError("write.units", "go with a recording", "measurements", "leave them out")
     measured = [data] if isinstance(data, Measured) else data
     require(measured, "data", "hold a measurement", "none", "give one")
-    rows: list[Row] = []
-    for number, one in enumerate(measured, 1):
-        # A measurement does not know its file.
-        name = Path(str(number))
-        if isinstance(one, SlidingMeasurement):
-            rows += sliding_rows(name, one)
-        else:
-            rows += modulated_rows(name, [one])
+    # A measurement does not know its file.
+    numbered = enumerate(measured, 1)
+    rows = [row for number, one in numbered for row in measured_rows(Path(str(number)), one)]
     write_rows(table_file(path, "write.path"), rows, "write.path")
     return Path(path)

@@ -130,7 +130,7 @@ def _measured(
     parts: Any = measurement
     if modulated:
         several = question.window is None and sum(p.modulated for p in measurement.stretches) > 1
-        parts = measure_amplitudes(trace, question) if several else [measurement]
+        parts = measure_amplitudes(trace, question) if several else measurement
     measured: dict[str, Any] = {
         "record": measured_record(measurement),
         "rows": measured_rows(Path(name), parts),
