@@ -24,7 +24,7 @@ from asperity.figures.style import (
     room_above,
     three_panels,
 )
-from asperity.measurement.record import mean_cycle, residual_spectrum
+from asperity.measurement.curves import mean_cycle, residual_spectrum
 from asperity.recording.defects.sampling import gap_rows
 from asperity.recording.extremes import extremes
 

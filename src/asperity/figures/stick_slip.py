@@ -17,7 +17,7 @@ from asperity.figures.style import (
     room_above,
     three_panels,
 )
-from asperity.measurement.record import middle_events
+from asperity.measurement.curves import middle_events
 from asperity.measurement.stick_slip.regimes import REPEATED
 
 if TYPE_CHECKING:

@@ -63,7 +63,7 @@ def strongest_line(
         # Averages over several samples hide fast lines: these are searched in a part.
         at = (time.size - _SPECTRUM) // 2
         piece = slice(at, at + _SPECTRUM)
-        spectra.append(_spectrum(*_evenly(time[piece], values[piece], _SPECTRUM)))
+        spectra.append(spectrum(time[piece], values[piece]))
     lines = [_top(*spectrum, between) for spectrum in spectra]
     present = [line for line in lines if line is not None]
     if not present:
@@ -73,6 +73,17 @@ def strongest_line(
         advice = "give another frequency or a longer window"
         raise InputError("lock_in.frequency", rule, got, advice)
     return max(present, key=lambda line: line.amplitude)
+
+
+def spectrum(time: Float, values: Float) -> tuple[Float, Float]:
+    """Frequencies (Hz) and amplitudes of a signal without mean and slope, in a Hann window.
+
+    Parameters
+    ----------
+    time, values : array, (n,)
+        As in `strongest_line`; means over blocks of a longer signal.
+    """
+    return _spectrum(*_evenly(time, values, _SPECTRUM))
 
 
 def require_modulated(line: SpectralLine, load: Float) -> None:

@@ -1,20 +1,19 @@
-"""A measurement as plain numbers and texts for JSON and tables, and as curves for pictures."""
+"""A measurement as plain numbers and texts for JSON and tables."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.arrays import Bool, Float
+from asperity.arrays import Float
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.series import MeanLevel
     from asperity.measurement.sliding.measure import SlidingMeasurement
-    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
 CONVENTIONS = (
     "W/W0 = 1 + epsilon cos phi + ..., F/W0 = mean_friction + sum of mu_n cos(n phi + phase_n); "
@@ -25,8 +24,6 @@ SLIDING_CONVENTIONS = (
     "change = level after less level before, both extrapolated to the step; "
     "healing = peak after a hold less level before it; uncertainties are standard uncertainties"
 )
-
-_BINS = 90
 
 
 def modulated_record(measurement: Measurement) -> dict[str, Any]:
@@ -183,86 +180,3 @@ def _level(level: MeanLevel | None) -> dict[str, float] | None:
 
 def _pairs(values: Any) -> list[list[float]]:
     return [[float(c.real), float(c.imag)] for c in values]
-
-
-class MeanCycle(NamedTuple):
-    """Friction over the phase of the load, less its mean.
-
-    Attributes
-    ----------
-    phase : array, shape (n,)
-        Over 2 pi, in the middles of the bins.
-    measured : array, shape (n,)
-        Mean of F/W0 - mean_friction in each bin, without the fitted drift.
-    fine_phase, fitted : array, shape (m,)
-        Sum of the fitted harmonics.
-    """
-
-    phase: Float
-    measured: Float
-    fine_phase: Float
-    fitted: Float
-
-
-def mean_cycle(measurement: Measurement) -> MeanCycle:
-    """The mean cycle of the force against the phase of the load.
-
-    Parameters
-    ----------
-    measurement : Measurement
-    """
-    reading, cut = measurement.reading, slice(*measurement.window)
-    time, force = measurement.samples.time[cut], measurement.samples.force[cut]
-    middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
-    trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
-    phase = reading.cycles(time)
-    where = ((phase % 1.0) * _BINS).astype(int) % _BINS
-    samples = np.bincount(where, minlength=_BINS)
-    mean = np.bincount(where, force - trend, minlength=_BINS) / np.maximum(samples, 1) / reading.W0
-    middles = (np.arange(_BINS) + 0.5) / _BINS
-    filled = samples > 0
-    fine = np.linspace(0, 1, 400)
-    order = np.arange(1, reading.harmonics.size + 1)[:, None]
-    fitted = (reading.harmonics[:, None] * np.exp(2j * np.pi * order * fine)).real.sum(0)
-    return MeanCycle(middles[filled], (mean - reading.mean_friction)[filled], fine, fitted)
-
-
-def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
-    """Amplitudes of the residual of F/W0 in the middle of the window, up to the next harmonic.
-
-    Parameters
-    ----------
-    measurement : Measurement
-
-    Returns
-    -------
-    frequency : array, shape (n,)
-        In Hz.
-    amplitude : array, shape (n,)
-        Under a Hann window.
-    """
-    reading, cut = measurement.reading, slice(*measurement.window)
-    time, force = measurement.samples.time[cut], measurement.samples.force[cut]
-    piece, left = reading.residual_of_piece(time, force)
-    grid = np.linspace(time[piece][0], time[piece][-1], left.size)
-    hann = np.cos(np.linspace(-np.pi / 2, np.pi / 2, grid.size)) ** 2
-    level = hann * np.interp(grid, time[piece], left) / reading.W0
-    amplitude = 2 * np.abs(np.fft.rfft(level)) / hann.sum()
-    frequency = np.fft.rfftfreq(grid.size, grid[1] - grid[0])
-    top = min(frequency[-1], (reading.harmonics.size + 1) * reading.frequency)
-    shown = (frequency > frequency[1]) & (frequency <= top)
-    return frequency[shown], amplitude[shown]
-
-
-#: Number of enlarged events.
-_CLOSE = 8
-
-
-def middle_events(measurement: StickSlipMeasurement) -> tuple[slice, Bool]:
-    """Some events in the middle of a recording, and the samples around them, for a picture."""
-    time, events = measurement.time, measurement.events
-    first = max((len(events) - _CLOSE) // 2, 0)
-    last = min(first + _CLOSE, len(events)) - 1
-    begin, end = float(events.onset[first]), float(events.end[last])
-    around = max((end - begin) / (2 * _CLOSE), float(events.slip_duration[first]))
-    return slice(first, last + 1), (time >= begin - around) & (time <= end + around)

@@ -154,7 +154,7 @@ def _measured(
 
 def _curves(measurement: Any) -> dict[str, Any]:
     """Curves of a measurement of any kind."""
-    from asperity.measurement.record import mean_cycle, middle_events, residual_spectrum
+    from asperity.measurement.curves import mean_cycle, middle_events, residual_spectrum
 
     if hasattr(measurement, "reading"):
         samples, W0 = measurement.samples, measurement.reading.W0
