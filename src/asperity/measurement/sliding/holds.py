@@ -124,7 +124,6 @@ def read_hold(
     velocity: float,
     *,
     degree: int,
-    begin: int,
     unsure: float = 0.0,
     recorded: float = 0.0,
 ) -> HoldReading:
@@ -135,15 +134,13 @@ def read_hold(
     time, friction, displacement : array, (n,)
         Times, friction and displacement of the recording; displacement None if it is not recorded.
     bounds : (int, int, int, int)
-        Samples: sliding before, hold, sliding after, its end.
+        Samples: steady sliding before, hold, sliding after, its end.
     edges : (float, float)
         First and last time of the hold (s).
     velocity : float
         Velocity of the sliding after the hold (m/s).
     degree : int
         Degree of the trend before the hold: 0 or 1.
-    begin : int
-        Sample from which on the sliding before the hold is steady.
     unsure : float
         Uncertainty of the end of the hold (s).
     recorded : float
@@ -153,7 +150,7 @@ def read_hold(
     def rounding(values: Float) -> float:
         return float(rounding_variance(recorded, float(np.std(values)))[0])
 
-    _, hold, again, stop = bounds
+    begin, hold, again, stop = bounds
     slid, mu = bin_means(time[begin:hold] - edges[0], friction[begin:hold])
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])

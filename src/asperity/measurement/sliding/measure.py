@@ -247,38 +247,33 @@ def _steps(
     """Steps between two sliding segments, and sentences on steps that cannot be read."""
     steps: list[VelocityStep] = []
     unread: list[str] = []
+    sides = []
     # Velocities of the user are exact.
-    exact = [Rate(velocity, 0.0, np.inf) for velocity in cut.velocities]
-    pairs = zip(cut.rates or exact, cut.velocities, strict=True)
-    rates = [rate._replace(value=velocity) for rate, velocity in pairs]
+    rates = cut.rates or (Rate(0.0, 0.0, np.inf),) * len(cut.velocities)
+    for (a, b), rate, velocity in zip(pairwise(bounds), rates, cut.velocities, strict=True):
+        part = signals.friction[a:b]
+        # Friction is counted against the motion, whatever its direction.
+        turned = -1.0 if np.median(part) < 0 else 1.0
+        sides.append((signals.time[a:b], turned * part, rate._replace(value=velocity)))
     # The first segment may begin with the loading.
     first = segments[0]
     speed = abs(first.velocity) if np.isfinite(first.velocity) and first.velocity else 1.0
     settling = speed * (first.steady.start - first.start)
     for k, change in enumerate(cut.cuts):
-        a, b, c = bounds[k : k + 3]
+        before, after = sides[k : k + 2]
+        # The slip in which friction settles after a hold, or a step that is not read, is not known:
+        # half of the sliding before the next step is left out.
+        earlier, settling = settling, np.inf
         if cut.holds[k] or cut.holds[k + 1]:
-            # The slip in which friction settles after a hold is not known: half of the sliding
-            # before the next step is left out.
-            settling = np.inf
             continue
-        if min(b - a, c - b) < _FEWEST:
+        if min(before[0].size, after[0].size) < _FEWEST:
             unread.append(f"the step at {change.time:.6g} s has too few samples on one side")
-            settling = np.inf
             continue
-        sides = []
-        for (low, high), velocity in (((a, b), rates[k]), ((b, c), rates[k + 1])):
-            part = signals.friction[low:high]
-            # Friction is counted against the motion, whatever its direction.
-            turned = -1.0 if np.median(part) < 0 else 1.0
-            sides.append((signals.time[low:high], turned * part, velocity))
-        before, after = sides
         step = read_step(
-            change.time, before, after, degree=degree, first_settling=settling, recorded=recorded
+            change.time, before, after, degree=degree, first_settling=earlier, recorded=recorded
         )
         if step is None:
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
-            settling = np.inf
             continue
         steps.append(step)
         settling = step.settling_slip
@@ -310,11 +305,10 @@ def _holds(
                 signals.time,
                 signals.friction,
                 signals.displacement,
-                (a, b, c, d),
+                (begin, b, c, d),
                 (cut.cuts[k - 1].time, cut.cuts[k].time),
                 cut.velocities[k + 1],
                 degree=degree,
-                begin=begin,
                 unsure=cut.cuts[k].doubt,
                 recorded=recorded,
             )
