@@ -21,13 +21,13 @@ from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
-from asperity.measurement.campaign import column_unit, modulated_rows
+from asperity.measurement.campaign import labelled_rows, modulated_rows
 from asperity.measurement.measure import Measurement, measure
 from asperity.parameters.arguments import at_least, number, typed
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
-from asperity.tribometer.sensors import Given
+from asperity.tribometer.sensors import Given, convert_fields
 from asperity.tribometer.tribometer import Tribometer
 from asperity.units import to_si
 
@@ -52,8 +52,7 @@ class Exciter:
     transfer: complex = 1.0
 
     def __post_init__(self) -> None:
-        hertz = number(self.frequency, "Exciter.frequency", "frequency", "positive")
-        object.__setattr__(self, "frequency", hertz)
+        convert_fields(self, {"frequency": ("frequency", "positive")})
 
     @classmethod
     @typed
@@ -167,29 +166,21 @@ class AmplitudeSeries:
             phase2`` with ``..._uncertainty`` where there is one, ``drift`` and ``verdict``; of
             the harmonics, those that were read.
         """
-        import xarray
-
         rows = modulated_rows(Path(), [point.measurement for point in self.points])
+        table = labelled_rows(rows).rename(epsilon="measured_epsilon").rename(row="epsilon")
         names = [name for stem in _NUMBERS for name in (stem, f"{stem}_uncertainty")]
-        columns = {
-            "measured_epsilon": [row["epsilon"] for row in rows],
-            **{n: [row[n] for row in rows] for n in names if all(n in row for row in rows)},
-            "drift": [point.drift for point in self.points],
-            "verdict": [row["verdict"] for row in rows],
-        }
-        data = {
-            name: ("epsilon", values, {"units": column_unit(name)} if name != "verdict" else {})
-            for name, values in columns.items()
-        }
+        kept = ["measured_epsilon", *(name for name in names if name in table), "verdict"]
         about = {"units": "1", "long_name": "commanded relative amplitude of the load"}
         epsilon = [point.epsilon for point in self.points]
+        drift = [point.drift for point in self.points]
         attributes = {
             "velocity": f"{self.velocity!r} m/s",
             "frequency": f"{self.frequency!r} Hz",
             "borne_over_applied": abs(self.transfer),
             "simulated": "yes",
         }
-        return xarray.Dataset(data, {"epsilon": ("epsilon", epsilon, about)}, attributes)
+        data = table[kept].assign(drift=("epsilon", drift, {"units": "1"}))
+        return data.assign_coords(epsilon=("epsilon", epsilon, about)).assign_attrs(attributes)
 
 
 #: Numbers of a reading over the commanded amplitude, each with its uncertainty where it has one.

@@ -26,6 +26,8 @@ from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.holds import HoldReading
     from asperity.measurement.sliding.measure import SlidingMeasurement
@@ -277,6 +279,12 @@ def _cell(value: Any) -> Any:
 
 
 def _write_netcdf(path: Path, table: list[Row]) -> None:
+    data = labelled_rows(table).assign_attrs(title="asperity measure: one row a file and part")
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def labelled_rows(table: list[Row]) -> xr.Dataset:
+    """Rows as a Dataset over ``row``, numbers with their units; a text is empty where unknown."""
     import pandas as pd
 
     frame = pd.DataFrame(table, columns=_columns(table))
@@ -287,12 +295,11 @@ def _write_netcdf(path: Path, table: list[Row]) -> None:
     frame = frame.astype(dict.fromkeys(numbers, float)).fillna(dict.fromkeys(texts, ""))
     data = frame.rename_axis("row").to_xarray().drop_vars("row")
     for name in numbers:
-        data[name].attrs = {"units": column_unit(str(name))}
-    data.attrs = {"title": "asperity measure: one row a file and part"}
-    data.to_netcdf(path, engine="h5netcdf")
+        data[name].attrs = {"units": _unit(str(name))}
+    return data
 
 
-def column_unit(name: str) -> str:
+def _unit(name: str) -> str:
     """SI unit of a column; empty for W0 and mean_force, whose unit is in the column 'unit'."""
     stem = re.sub(r"_(uncertainty|interval_95|spread)$", "", name)
     # All phases have one unit, as have the velocities before and after a step.
