@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.arrays import Float
-from asperity.parameters.arguments import number
-from asperity.tribometer.sensors import Given
+from asperity.tribometer.sensors import Given, convert_fields
 from asperity.units import to_radians
 
 
@@ -27,8 +26,7 @@ class DirectShear:
     surfaces = 1
 
     def __post_init__(self) -> None:
-        area = number(self.area, f"{type(self).__name__}.area", "area", "positive")
-        object.__setattr__(self, "area", area)
+        convert_fields(self, {"area": ("area", "positive")})
 
     def stresses(self, shear_force: ArrayLike, normal_force: ArrayLike) -> tuple[Float, Float]:
         """Shear and normal stress (Pa) of the machine's forces (N)."""
@@ -70,12 +68,10 @@ class Triaxial:
     angle: Given
 
     def __post_init__(self) -> None:
-        diameter = number(self.diameter, "Triaxial.diameter", "length", "positive")
-        angle = to_radians(self.angle, "Triaxial.angle")
+        object.__setattr__(self, "angle", to_radians(self.angle, "Triaxial.angle"))
+        convert_fields(self, {"diameter": ("length", "positive")})
         for rule in ("positive", "below a right angle"):
-            angle = number(angle, "Triaxial.angle", "dimensionless", rule)
-        object.__setattr__(self, "diameter", diameter)
-        object.__setattr__(self, "angle", angle)
+            convert_fields(self, {"angle": ("dimensionless", rule)})
 
     @property
     def area(self) -> float:

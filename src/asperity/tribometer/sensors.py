@@ -13,6 +13,7 @@ three intervals next to it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, TypeAlias
 
@@ -131,6 +132,26 @@ def between(values: Float, rate: float, times: Float) -> Float:
 #: A number in SI or a text with its unit; converted to a float in SI at construction.
 Given: TypeAlias = Any
 
+
+def convert_fields(instrument: Any, rules: Mapping[str, tuple[str, str]]) -> None:
+    """Replace fields of a frozen dataclass, numbers in SI or texts with units, by numbers in SI.
+
+    Parameters
+    ----------
+    instrument : dataclass
+    rules : mapping of str to (str, str)
+        Kind and rule of each field, as `asperity.parameters.arguments.number` takes them.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule.
+    """
+    for name, (kind, rule) in rules.items():
+        label = f"{type(instrument).__name__}.{name}"
+        object.__setattr__(instrument, name, number(getattr(instrument, name), label, kind, rule))
+
+
 #: Kinds of the fields of a sensor that are not in the unit of its quantity.
 _KINDS = {
     "bandwidth": "frequency",
@@ -202,12 +223,9 @@ class Sensor:
         return _KINDS.get(field, cls.kind)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = f"{type(self).__name__}.{field.name}"
-            stated = getattr(self, field.name)
-            rule = _RULES.get(field.name, "not negative")
-            value = number(stated, name, self.kind_of(field.name), rule)
-            object.__setattr__(self, field.name, value)
+        names = [field.name for field in fields(self)]
+        rules = {n: (self.kind_of(n), _RULES.get(n, "not negative")) for n in names}
+        convert_fields(self, rules)
         for name in ("damping", "impulses"):
             value, label = getattr(self, name), f"{type(self).__name__}.{name}"
             require(value < 1, label, "be below 1", f"{value:g}", "correct the value")

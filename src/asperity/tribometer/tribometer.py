@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require, require_known
-from asperity.parameters.arguments import at_least, number, one_of, typed
+from asperity.parameters.arguments import at_least, one_of, typed
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace, check
 from asperity.tribometer.sensors import (
@@ -23,6 +23,7 @@ from asperity.tribometer.sensors import (
     Given,
     Sensor,
     between,
+    convert_fields,
     filtered,
     low_pass,
     resonant,
@@ -72,16 +73,10 @@ class Recorder:
         return _KINDS.get(field, "dimensionless")
 
     def __post_init__(self) -> None:
-        for name, rule in (
-            ("rate", "positive"),
-            ("cut_off", "positive"),
-            ("jitter", "not negative"),
-            ("clock_error", "finite"),
-        ):
-            stated = getattr(self, name)
-            if stated is not None or name != "cut_off":
-                value = number(stated, f"Recorder.{name}", self.kind_of(name), rule)
-                object.__setattr__(self, name, value)
+        rules = {"rate": "positive", "jitter": "not negative", "clock_error": "finite"}
+        if self.cut_off is not None:
+            rules["cut_off"] = "positive"
+        convert_fields(self, {name: (self.kind_of(name), rule) for name, rule in rules.items()})
         for name, low, high in (("order", 1, 8), ("bits", 0, 32)):
             value, rule = getattr(self, name), f"lie between {low} and {high}"
             advice = f"give one such as {high // 2}"
