@@ -144,6 +144,19 @@ def test_a_defect_is_named_and_nothing_else(steady, trace, defect) -> None:
         assert measured == pytest.approx(number, rel=rel)
 
 
+def test_harmonics_of_the_load_count_where_contact_is_lost(steady, trace) -> None:
+    """A square wave of the load that reaches zero has a first harmonic of 1.27 W0, a ramp 0.64."""
+    time, load, force = steady()
+    ramp = 2 * ((60.013 * time + 0.7 / (2 * np.pi)) % 1.0)
+    noise = load - load.mean() - 1.68 * np.cos(2 * np.pi * 60.013 * time + 0.7)
+    measurement = measure(trace(time, 7 * ramp + noise, force), harmonics=16)
+    (contact,) = (c for c in measurement.checks if c.name == "contact")
+    assert measurement.reading.epsilon == pytest.approx(2 / np.pi, rel=0.01)
+    # The ramp jumps between two samples, where its harmonics overshoot.
+    assert contact.verdict == "bad"
+    assert contact.number == pytest.approx(1.0, abs=0.25)
+
+
 def test_noise_over_few_periods_is_not_taken_for_sidebands(steady, trace) -> None:
     """In the spectrum of thirty periods every sideband is next to the line."""
     for seed in range(8):

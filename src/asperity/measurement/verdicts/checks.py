@@ -22,6 +22,9 @@ _LOW_FRICTION, _HIGH_FRICTION = (0.02, -2.0), (2.0, 20.0)
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
 _LINE = 6.0
 
+#: Phases of a period, both ends included, at which the smallest load is looked for.
+_PHASES = 257
+
 
 def modulation(reading: LockInReading) -> Check:
     """Whether the load is modulated at all."""
@@ -67,8 +70,7 @@ def load_harmonics(reading: LockInReading) -> Check:
         f"the first harmonic it makes {effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once"
     )
-    present = share > 4 * second.amplitude_uncertainty
-    seen = present and effect > response.amplitude_uncertainty
+    seen = _in_load(reading, 2) and effect > response.amplitude_uncertainty
     return LOCK_IN.check("load harmonics", number, text, significant=seen)
 
 
@@ -236,11 +238,21 @@ def _times(number: float) -> str:
 
 def contact(reading: LockInReading) -> Check:
     """Whether the load stays above zero."""
+    # Of the harmonics those count that noise does not explain.
+    seen = [n for n in range(1, reading.harmonics.size + 1) if n == 1 or _in_load(reading, n)]
+    turns = np.exp(2j * np.pi * np.outer(np.linspace(0, 1, _PHASES), seen))
+    number = -float((turns @ reading.load_harmonics[np.array(seen) - 1]).real.min())
     text = (
-        f"the load falls to {1 - reading.epsilon:.3g} {symbol('W0')} in each period; below zero "
+        f"the load falls to {1 - number:.3g} {symbol('W0')} in each period; below zero "
         "contact is lost, or the load's zero or sign is not that of the recording"
     )
-    return LOCK_IN.check("contact", reading.epsilon, text)
+    return LOCK_IN.check("contact", number, text)
+
+
+def _in_load(reading: LockInReading, n: int) -> bool:
+    """Whether the load has harmonic n beyond noise."""
+    phasor = reading.load_phasor(n)
+    return phasor.amplitude > 4 * phasor.amplitude_uncertainty
 
 
 def friction(number: float) -> Check:
