@@ -59,13 +59,6 @@ def turning_points(values: Float, height: float) -> Index:
         after = np.concatenate([size[1:], [np.inf]])
         small = np.flatnonzero((size < height) & (size <= before) & (size < after))
         if not small.size:
-            # Equal neighbours at the right end.
-            if size[-1] < height:
-                at = at[:-1]
-                continue
-            if size[0] < height:
-                at = at[1:]
-                continue
             break
         gone = np.zeros(at.size, bool)
         # Both ends of a small change are removed, also at the first and the last point.
