@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.experiment import channel_gain
+from asperity.experiment.motion import motion_rate
 from asperity.tribometer.sensors import Accelerometer, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
 
@@ -35,3 +36,11 @@ def test_gain_is_one_far_below_and_of_the_shape_asked_for():
     assert gain.shape == (1, 2)
     assert gain[0, 0] == pytest.approx(1, abs=1e-4)
     assert abs(gain[0, 1]) == pytest.approx(1 / np.sqrt((1 + 0.3**2) * (1 + 0.4**6)), rel=1e-12)
+
+
+def test_the_motion_is_sampled_finely_enough_for_a_gauge_that_rings():
+    gauge = SpringGauge(stiffness=2e5, bandwidth="400 Hz", resonance="30 kHz", noise="5 nm")
+    machine = Tribometer(sensors={"F": gauge}, recorder=Recorder(rate="5 kHz"))
+    rate = motion_rate(machine)
+    assert rate == 60_000.0
+    assert len(machine.record(np.arange(600) / rate, {"F": np.ones(600)})) == 50

@@ -331,6 +331,7 @@ def test_the_tribometer_does_not_change_the_motion(write) -> None:
         ('noise = "5 nm"', "noise = [1, 2]", "sensors.shear force.noise must be one number"),
         ("seed = 3", "order = true", "tribometer.order must be a whole number, got True"),
         ('bandwidth = "500 Hz"', 'bandwidth = "2 kHz"', "solver.sampling must be at least 4000 Hz"),
+        ('noise = "5 nm"', 'resonance = "3 kHz"', "solver.sampling must be at least 6000 Hz"),
         ("sensors", "sensor", "tribometer.sensors must have a table"),
         ('"5 nm"', "5e-9", "sensors.shear force.noise must carry a unit, got 5e-09"),
         ('"1 kHz"', "1000", "tribometer.rate must carry a unit, got 1000"),

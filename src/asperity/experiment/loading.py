@@ -16,7 +16,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
-from asperity.loads import Programme, Slide
+from asperity.loads import Slide
 from asperity.parameters.arguments import at_least, number, typed
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
@@ -98,9 +98,9 @@ def loading_recording(
     stroke = float(slider.law.mu_ss(speed)) * W0 / np.asarray(slider.K).item() / speed
     back, there = (1 - low) * stroke, (high - low) * stroke
     rounds = [Slide(there, velocity=speed), Slide(there, velocity=-speed)] * cycles
-    programme = Programme(Slide(back, velocity=-speed), *rounds, load=W0, velocity=speed)
+    steps = [Slide(back, velocity=-speed), *rounds]
     rule = "loading_recording.slider must stay below the threshold"
-    return recorded_motion(slider, tribometer, programme, rule, seed=seed, options=options)
+    return recorded_motion(slider, tribometer, steps, speed, rule, seed=seed, options=options)
 
 
 @typed

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import InputError
-from asperity.loads import Programme
+from asperity.loads import Programme, ProgrammeStep
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.transients import integrate_blocks
@@ -26,8 +26,10 @@ _FINER = 8
 def motion_rate(tribometer: Tribometer) -> float:
     """Sampling rate (Hz) of a motion for a tribometer, a multiple of the recorder's rate."""
     recorder = float(tribometer.recorder.rate)
-    fastest = max(float(sensor.bandwidth) for sensor in tribometer.sensors.values())
-    return recorder * max(_FINER, int(np.ceil(4 * fastest / recorder)))
+    sensors = tribometer.sensors.values()
+    # A resonance, which most gauges do not have, needs two samples a period.
+    fastest = max(max(4 * float(s.bandwidth), 2 * float(s.resonance)) for s in sensors)
+    return recorder * max(_FINER, int(np.ceil(fastest / recorder)))
 
 
 def signals(
@@ -69,17 +71,28 @@ def signals(
 def recorded_motion(
     slider: Slider,
     tribometer: Tribometer,
-    programme: Programme,
+    steps: Sequence[ProgrammeStep],
+    velocity: float,
     rule: str,
     *,
     seed: int,
     options: Mapping[str, Any],
 ) -> Trace:
-    """Integrate a programme to its end, and record the channels of the tribometer.
+    """Integrate steps of an experiment to their end, and record the channels of the tribometer.
 
-    Parameters as of `signals`, which refuses a motion that ends early, and `seed`, that of the
-    tribometer's noise.
+    Parameters
+    ----------
+    slider, tribometer
+    steps : sequence of ProgrammeStep
+        From steady sliding under the load of the slider.
+    velocity : float
+        Pulling velocity before the first step (m/s).
+    rule, options
+        As of `signals`, which refuses a motion that ends early.
+    seed : int
+        Of the tribometer's noise.
     """
+    programme = Programme(*steps, load=np.asarray(slider.W0).item(), velocity=velocity)
     wanted = ("force", "load", "displacement")
     rate = motion_rate(tribometer)
     columns, provenance = signals(slider, programme, rate, wanted, rule, options)

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import numpy as np
-
 from asperity.errors import require
 from asperity.experiment.motion import recorded_motion
-from asperity.loads import Hold, Programme, ProgrammeStep, Slide
+from asperity.loads import Hold, ProgrammeStep, Slide
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import Given, LaidOut, LoadAndVelocity
 from asperity.parameters.arguments import at_least, typed
@@ -114,8 +112,10 @@ def slide_hold_slide(
     InputError
         If a value breaks its rule, or the motion ends before the series does.
     """
-    series = SlideHoldSlide(tuple(holds), sliding)
-    return _recording(slider, tribometer, series, velocity, "slide_hold_slide", seed, options)
+    series = [SlideHoldSlide(tuple(holds), sliding)]
+    speed = to_si(velocity, "velocity", "slide_hold_slide.velocity")
+    rule = "slide_hold_slide.slider must slide to the end of the series"
+    return recorded_motion(slider, tribometer, series, speed, rule, seed=seed, options=options)
 
 
 @typed
@@ -144,21 +144,8 @@ def velocity_steps(
     InputError
         If a value breaks its rule, or the motion ends before the series does.
     """
-    series = VelocitySteps(tuple(velocities), slip)
+    series = [VelocitySteps(tuple(velocities), slip)]
     first = velocities[0] if len(velocities) else 0.0
-    return _recording(slider, tribometer, series, first, "velocity_steps", seed, options)
-
-
-def _recording(
-    slider: Slider,
-    tribometer: Tribometer,
-    series: ProgrammeStep,
-    velocity: float | str,
-    name: str,
-    seed: int,
-    options: dict[str, Any],
-) -> Trace:
-    speed = to_si(velocity, "velocity", f"{name}.velocity")
-    programme = Programme(series, load=np.asarray(slider.W0).item(), velocity=speed)
-    rule = f"{name}.slider must slide to the end of the series"
-    return recorded_motion(slider, tribometer, programme, rule, seed=seed, options=options)
+    speed = to_si(first, "velocity", "velocity_steps.velocity")
+    rule = "velocity_steps.slider must slide to the end of the series"
+    return recorded_motion(slider, tribometer, series, speed, rule, seed=seed, options=options)

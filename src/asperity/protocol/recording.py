@@ -185,8 +185,12 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
 
 def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:
     """Check, before the computation, that the motion is sampled finely enough."""
-    wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
+    fastest = max(max(s.bandwidth, s.resonance) for s in sensors.values())
+    wanted = max(recorder.rate, 2 * fastest)
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"
-        rule = f"be at least {wanted:g} Hz for the tribometer, its rate and twice its bandwidths"
+        rule = (
+            f"be at least {wanted:g} Hz for the tribometer, its rate and twice its bandwidths and "
+            "resonances"
+        )
         raise InputError("solver.sampling", rule, shown, "give four times its rate if you can")
