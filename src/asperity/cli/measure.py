@@ -308,7 +308,7 @@ def _one(
         and f"1 of {modulated} modulated stretches is read; --amplitudes reads each",
     )
     if events is not None:
-        slips, advice = hasattr(result, "regimes"), "leave it out, or add --stick-slip"
+        slips, advice = result.mode == "stick-slip", "leave it out, or add --stick-slip"
         require(slips, "--events", "go with a stick-slip recording", "another", advice)
         catalogue.write_catalogue(result, events)
     about = {"recording": str(recording), "version": __version__, **trace.provenance}

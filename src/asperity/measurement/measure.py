@@ -82,6 +82,7 @@ class Measurement(Judged):
         Who chose the window.
     """
 
+    mode = "modulated"
     _drawn_by = "asperity.figures.recording:draw_modulated"
 
     reading: LockInReading

@@ -46,7 +46,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
     if isfinite(measurement.delta_mu_interval_95):
         intervals["delta_mu"] = measurement.delta_mu_interval_95
     return {
-        "mode": "modulated",
+        "mode": measurement.mode,
         "verdict": measurement.verdict,
         **values,
         "static_friction": measurement.static_friction,
@@ -155,7 +155,7 @@ def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
         As in `modulated_record`.
     """
     return {
-        "mode": "sliding",
+        "mode": measurement.mode,
         "verdict": measurement.verdict,
         "friction": _level(measurement.friction),
         "load": _level(measurement.load),

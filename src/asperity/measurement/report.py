@@ -29,9 +29,9 @@ _STILL = 1e-15
 
 def measured_record(measurement: Any) -> dict[str, Any]:
     """A measurement of any kind for JSON."""
-    if hasattr(measurement, "reading"):
+    if measurement.mode == "modulated":
         return modulated_record(measurement)
-    if hasattr(measurement, "regimes"):
+    if measurement.mode == "stick-slip":
         return stick_slip_record(measurement)
     return sliding_record(measurement)
 
@@ -47,9 +47,9 @@ def measured_rows(path: Path, measurement: Any) -> list[Row]:
     """
     if isinstance(measurement, list):
         return modulated_rows(path, measurement)
-    if hasattr(measurement, "reading"):
+    if measurement.mode == "modulated":
         return modulated_rows(path, [measurement])
-    if hasattr(measurement, "regimes"):
+    if measurement.mode == "stick-slip":
         return [stick_slip_row(path, measurement)]
     return sliding_rows(path, measurement)
 
@@ -65,9 +65,9 @@ def measured_sections(measurement: Any, name: str, names: Names = "friction") ->
     names : {"friction", "geophysics"}
         In which a load that is a force keeps a name of its own: it is no stress.
     """
-    if hasattr(measurement, "reading"):
+    if measurement.mode == "modulated":
         return _modulated(measurement, name, names)
-    if hasattr(measurement, "regimes"):
+    if measurement.mode == "stick-slip":
         return _stick_slip(measurement, name)
     return _sliding(measurement, name)
 

@@ -116,7 +116,6 @@ def _measured(
         measured_rows,
         measured_sections,
     )
-    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
     names: Names = argument.get("names", NAMES[0])
 
@@ -125,8 +124,8 @@ def _measured(
     report(stage="measuring")
     measurement: Any
     measurement, note = answer_measurement(trace, question, plain=True)
-    modulated = hasattr(measurement, "reading")
-    stick_slip = isinstance(measurement, StickSlipMeasurement)
+    modulated = measurement.mode == "modulated"
+    stick_slip = measurement.mode == "stick-slip"
     parts: Any = measurement
     if modulated:
         several = question.window is None and sum(p.modulated for p in measurement.stretches) > 1
@@ -156,7 +155,7 @@ def _curves(measurement: Any) -> dict[str, Any]:
     """Curves of a measurement of any kind."""
     from asperity.measurement.curves import mean_cycle, middle_events, residual_spectrum
 
-    if hasattr(measurement, "reading"):
+    if measurement.mode == "modulated":
         samples, W0 = measurement.samples, measurement.reading.W0
         return {
             "load": thinned(samples.time, samples.load / W0, _BLOCKS),
@@ -165,7 +164,7 @@ def _curves(measurement: Any) -> dict[str, Any]:
             "spectrum": thinned(*residual_spectrum(measurement), _BLOCKS),
         }
     time = measurement.time
-    if not hasattr(measurement, "regimes"):
+    if measurement.mode == "sliding":
         return {"friction": thinned(time, measurement.values, _BLOCKS)}
     friction = measurement.friction
     curves = {"friction": thinned(time, friction, _BLOCKS)}

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
@@ -19,7 +20,6 @@ from asperity.measurement.series import (
     columns,
     effective_dof,
     fit_trend,
-    moving_mean,
     neighbour_scatter,
     slope_of,
     weighted_line,
@@ -302,7 +302,7 @@ def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, floa
 
 
 def _smoothed(values: Float, wide: int) -> Float:
-    return moving_mean(np.pad(values, wide // 2, mode="edge"), wide)[: values.size]
+    return np.asarray(uniform_filter1d(values, wide, mode="nearest"))
 
 
 def _reload(

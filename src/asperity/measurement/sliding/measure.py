@@ -109,6 +109,7 @@ class SlidingMeasurement(Judged):
     checks : tuple of Check
     """
 
+    mode = "sliding"
     _drawn_by = "asperity.figures.recording:draw_sliding"
 
     friction: MeanLevel

@@ -49,7 +49,7 @@ class StickSlipSeries:
 
     def column(self, name: str) -> Float:
         """Numbers of the rows; NaN where they are not known."""
-        return np.array([_known(row.get(name)) for row in self.rows])
+        return np.array([row.get(name) for row in self.rows], float)
 
     def mass(self, default: float) -> float:
         """Median M of the rows (kg); the default where it is not known."""
@@ -124,7 +124,7 @@ class StickSlipCampaign(Drawn):
     def of(cls, table: Iterable[Mapping[str, Any]]) -> StickSlipCampaign:
         """The campaign of a table; rows without a regime are left out."""
         rows = [row for row in table if row.get("regime")]
-        machine = np.array([[_known(row.get(name)) for name in ("K", "W0")] for row in rows])
+        machine = np.array([[row.get(name) for name in ("K", "W0")] for row in rows], float)
         machine = machine.reshape(-1, 2)
         groups: list[list[int]] = []
         for n in np.lexsort(machine.T[::-1]):
@@ -170,7 +170,3 @@ class StickSlipCampaign(Drawn):
                 value = f"cannot tell: {condition}" if np.isnan(low) else value
                 lines.append(SummaryLine(symbol("B - A"), value))
         return f"StickSlipCampaign, {count} recordings", lines
-
-
-def _known(value: Any) -> float:
-    return float("nan") if value is None else float(value)

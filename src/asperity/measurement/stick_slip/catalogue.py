@@ -166,9 +166,7 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
         "stiffness_from_slope_uncertainty": uncertainty,
         "smallest_drop": measurement.smallest_drop,
     }
-    K, V, W0 = (
-        math.nan if v is None else v for v in (machine.stiffness, machine.velocity, machine.load)
-    )
+    K, V, W0 = np.array([machine.stiffness, machine.velocity, machine.load], float)
     frequency, error = linear_frequency(events, K * V / W0)
     row |= {"linear_frequency": frequency, "linear_frequency_uncertainty": error}
     known = (machine.stiffness, machine.velocity, machine.mass, machine.load)
@@ -201,7 +199,7 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
 def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
     """Everything that a stick-slip recording says, as numbers, texts, lists and dicts in SI."""
     return {
-        "mode": "stick-slip",
+        "mode": measurement.mode,
         "verdict": measurement.verdict,
         "regime": measurement.kind,
         "regimes": [asdict(regime) for regime in measurement.regimes],

@@ -107,6 +107,7 @@ class StickSlipMeasurement(Judged):
     checks : tuple of Check
     """
 
+    mode = "stick-slip"
     _drawn_by = "asperity.figures.stick_slip:draw_stick_slip"
 
     time: Float

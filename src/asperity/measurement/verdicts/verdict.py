@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
+from typing import ClassVar, Literal
 
 from asperity.parameters.parameter import Drawn, SummaryLine
 
@@ -152,6 +152,8 @@ def doubts_text(checks: Iterable[Check]) -> str:
 class Judged(Drawn):
     """A measurement with its checks, the basis of all kinds of measurements."""
 
+    #: Kind of the measurement, as its record has it.
+    mode: ClassVar[Literal["modulated", "sliding", "stick-slip"]]
     checks: tuple[Check, ...]
 
     @property
