@@ -55,18 +55,11 @@ def turning_points(values: Float, height: float) -> Index:
     at = np.concatenate([[0], turns, changing[-1:] + 1]).astype(np.intp)
     while at.size > 1:
         size = np.abs(np.diff(values[at]))
-        before = np.concatenate([[np.inf], size[:-1]])
-        after = np.concatenate([size[1:], [np.inf]])
-        small = np.flatnonzero((size < height) & (size <= before) & (size < after))
+        sides = np.pad(size, 1, constant_values=np.inf)
+        small = np.flatnonzero((size < height) & (size <= sides[:-2]) & (size < sides[2:]))
         if not small.size:
             break
-        gone = np.zeros(at.size, bool)
-        # Both ends of a small change are removed, also at the first and the last point.
-        gone[small[small > 0]] = True
-        gone[small[small < size.size - 1] + 1] = True
-        gone[0] |= small[0] == 0
-        gone[-1] |= small[-1] == size.size - 1
-        at = at[~gone]
+        at = np.delete(at, np.concatenate([small, small + 1]))
     return at
 
 

@@ -136,11 +136,8 @@ def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
 def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
-    before = np.concatenate([[0], trough[:-1]])
     # Cells end in the middle of the sticks.
-    edges = np.concatenate(
-        [[(before[0] + peak[0]) // 2], (trough[:-1] + peak[1:]) // 2, [(trough[-1] + n) // 2]]
-    ).astype(np.intp)
+    edges = (np.append(0, trough) + np.append(peak, n)) // 2
     sums = Sums(force, edges[:-1], peak)
     drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
@@ -150,16 +147,16 @@ def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     stop = np.minimum(edges[1:], trough + length)
     # Only the middle half of a stick is fitted: inertia, a ringing gauge and creep bend its ends.
     quarter = (peak[1:] - trough[:-1]) // 4
-    sticks = _sticks(force, trough[:-1] + quarter, peak[1:] - quarter + 2, falls.scatter)
+    middles = trough[:-1] + quarter, peak[1:] - quarter + 2
+    sticks = _sticks(force, *middles, falls.scatter)
     rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
     bounds = peak, trough, first, stop
     # The shape is estimated from events of the whole recording. They are not the largest events:
     # among equal slips, noise alone decides which is the largest.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
     large = large[np.linspace(0, large.size - 1, min(large.size, _MEASURED_EVENTS)).astype(np.intp)]
-    runs = (trough[:-1] + quarter, peak[1:] - quarter + 2) if k > 1 else (first, peak)
     of_large = tuple(b[large] for b in bounds)
-    noise = _noise(force, *runs)
+    noise = _noise(force, *(middles if k > 1 else (first, peak)))
     scatter = falls.scatter
     timing = _timing(sums, large, of_large, rate[large], drop[large], noise, scatter)
     shape = timing.shape
@@ -206,8 +203,8 @@ def _onset_and_end(
         off = span_end[0][:, None] + (span_end[1] - span_end[0])[:, None] * grid
         until = np.maximum(np.floor(on).astype(np.intp) + 1, first[:, None] + 2)
         since = np.minimum(np.ceil(off).astype(np.intp), stop[:, None] - 2)
-        left = sums.line(np.broadcast_to(first[:, None], on.shape), until)
-        right = sums.line(since, np.broadcast_to(stop[:, None], off.shape))
+        left = sums.line(first[:, None], until)
+        right = sums.line(since, stop[:, None])
         high = left[0] + left[1] * (on - at)
         low = right[0] + right[1] * (off - at)
         # The slip as sums over bins, from the earliest onset to the latest end.
@@ -226,8 +223,7 @@ def _onset_and_end(
         misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
-        straight = left[2][:, :, None] + right[2][:, None, :]
-        misfit += straight
+        misfit += left[2][:, :, None] + right[2][:, None, :]
         # The end comes after the onset, and the force falls.
         wrong = (off[:, None, :] <= on[:, :, None]) | (low[:, None, :] >= high[:, :, None])
         misfit[wrong] = np.inf

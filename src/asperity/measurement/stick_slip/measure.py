@@ -322,8 +322,7 @@ def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
     if signals.displacement is None or not len(events):
         return np.nan
     at = np.interp(np.stack([events.onset, events.end]), signals.time, signals.displacement)
-    while_events = np.interp([events.onset[0], events.end[-1]], signals.time, signals.displacement)
-    moved = abs(float(np.diff(while_events)[0]))
+    moved = abs(float(at[1, -1] - at[0, 0]))
     return float(np.abs(at[1] - at[0]).sum()) / moved if moved else np.nan
 
 
