@@ -167,9 +167,7 @@ def measure_amplitudes(
         return [measure(trace, question)]
     recording = _prepared(trace, question)
     measurements: list[Measurement | InputError] = []
-    for part in recording.parts:
-        if not part.modulated:
-            continue
+    for part in (p for p in recording.parts if p.modulated):
         try:
             measurements.append(_measured(recording, part))
         except InputError as error:

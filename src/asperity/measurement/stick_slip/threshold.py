@@ -238,12 +238,9 @@ def write_thresholds(path: Path, table: Sequence[Threshold]) -> None:
         CSV in SI without units.
     table : sequence of Threshold
     """
+    known = [one for one in table if not one.reason]
     with path.open("w", encoding="utf-8", newline="") as stream:
-        for one in table:
-            if one.reason:
-                stream.write(f"# cannot tell: {one.reason}\n")
+        stream.writelines(f"# cannot tell: {one.reason}\n" for one in table if one.reason)
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for one in table:
-            if not one.reason:
-                writer.writerow([f"{getattr(one, name):.8g}" for name in COLUMNS])
+        writer.writerows([f"{getattr(one, name):.8g}" for name in COLUMNS] for one in known)
