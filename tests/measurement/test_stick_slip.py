@@ -209,6 +209,12 @@ def test_a_trend_or_a_single_slip_is_refused() -> None:
         asp.measure(recorded(saw(0, events=1).force))
 
 
+def test_a_force_of_mean_zero_is_no_regime() -> None:
+    force = np.repeat([-0.25, 0.25], 4000)
+    assert measure_stick_slip(recorded(force)).kind == "cannot tell"
+    assert measure_stick_slip(recorded(0 * force)).kind == "cannot tell"
+
+
 def test_noise_of_a_saturated_recording_makes_no_events() -> None:
     friction = np.minimum(saw(0, events=50, noise=0.02).force, 0.32)
     assert len(measure_stick_slip(recorded(friction)).events) == 50

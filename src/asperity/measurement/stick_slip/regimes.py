@@ -186,18 +186,17 @@ def _other_velocity(slope: Float) -> Bool:
 def _without_events(
     time: Float, force: Float, smallest_drop: float, falls: int, impulses: float
 ) -> Regime:
-    mean = abs(float(np.mean(force)))
-    share = smallest_drop / mean if mean else np.inf
+    mean, change = abs(float(np.mean(force))), _rise(force)
+    share, moved = (size / mean if mean else np.inf for size in (smallest_drop, abs(change)))
     seen = f"no fall of the force is larger than noise makes, {smallest_drop:.2g}"
     kind: Kind = "steady sliding" if share < _BLIND else "cannot tell"
     if kind == "cannot tell":
         seen += f", which is {100 * share:.2g} % of the mean: smaller drops cannot be seen"
-    change = _rise(force)
     if abs(change) > max(_BLIND * mean, smallest_drop):
         kind = "cannot tell"
         seen += (
-            f", and it {'rises' if change > 0 else 'falls'} by {100 * abs(change) / mean:.2g} % of "
-            "its mean throughout: sliding, or a stick longer than the recording"
+            f", and it {'rises' if change > 0 else 'falls'} by {100 * moved:.2g} % of its mean "
+            "throughout: sliding, or a stick longer than the recording"
         )
     if falls:
         kind = "cannot tell"
