@@ -347,7 +347,7 @@ def _exchanged(signals: SlidingSignals, spread: float) -> str:
     if borne is None or borne.size != friction.size or abs(friction.mean()) < 1:
         return ""
     shear = friction * borne
-    steadier = float(shear.std() / abs(shear.mean())) < spread
+    steadier = shear.std() < spread * abs(shear.mean())
     return "; the shear is larger and steadier: are their columns exchanged?" if steadier else ""
 
 
