@@ -16,7 +16,6 @@ has, by what the recording holds, the numbers of recordings, of findings "satura
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,15 +23,12 @@ import numpy as np
 import asperity as asp
 from asperity.errors import InputError
 from asperity.recording import Channel, Trace
+from benchmarks.populations import log_uniform, seeds
 
 Float = np.ndarray
 W0 = 7.0
 #: A harmonic is compared if it is at least this share of the height of a cycle.
 _COMPARED = 0.01
-
-
-def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 @dataclass(frozen=True)
@@ -157,18 +153,15 @@ def judged(seed: int) -> tuple[Drawn, bool, str, dict[str, float], list[str]]:
 
 def main() -> None:
     """Print the table, and recordings that are wrong and ok."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--recordings", type=int, default=600)
-    parser.add_argument("--seed", type=int, default=0, help="of the first recording")
-    chosen = parser.parse_args()
-    rows = [judged(k) for k in range(chosen.seed, chosen.seed + chosen.recordings)]
+    recordings = seeds(__doc__, 600)
+    rows = [judged(k) for k in recordings]
     print("| holds | recordings | saturation | ok | wrong and ok |\n" + "|---" * 5 + "|")
     for kind in sorted({row[0].kind for row in rows}):
         these = [row for row in rows if row[0].kind == kind]
         ok = [row for row in these if row[2] == "ok"]
         cells = len(these), sum(row[1] for row in these), len(ok), sum(bool(r[3]) for r in ok)
         print(f"| {kind} | " + " | ".join(map(str, cells)) + " |")
-    for k, (recording, named, verdict, wrong, doubts) in enumerate(rows, chosen.seed):
+    for k, (recording, named, verdict, wrong, doubts) in zip(recordings, rows, strict=True):
         if wrong and verdict == "ok":
             sizes = {name: f"{value:.1%}" for name, value in wrong.items()}
             print(f"wrong and ok: seed {k}, {recording.kind}: {recording}: {sizes}")

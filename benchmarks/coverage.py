@@ -30,6 +30,7 @@ from scipy.signal import lfilter
 
 from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
 from asperity.recording import Channel, Trace
+from benchmarks.populations import inside
 
 TRUTH = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "alpha": 0.2}
 #: Stiffness over the load (1/m), and the load (Pa).
@@ -231,7 +232,7 @@ def covered(
 ) -> dict[str, Any]:
     """Shares of intervals that contain the truth, and means of their widths, by parameter."""
     true = case.true
-    inside = {n: np.zeros(2) for n in true}
+    hits = {n: np.zeros(2) for n in true}
     widths: dict[str, list[float]] = {n: [] for n in true}
     errors: dict[str, list[float]] = {n: [] for n in true}
     failed, noise_rejected, done = 0, 0, 0
@@ -250,12 +251,9 @@ def covered(
             continue
         done += 1
         noise_rejected += any("noise" in w for w in result.warnings)
-        for n, truth in true.items():
-            p = result.parameters[n]
-            inside[n] += [
-                p.interval_68[0] <= truth <= p.interval_68[1],
-                p.interval_95[0] <= truth <= p.interval_95[1],
-            ]
+        for n, within in inside(result.parameters, true).items():
+            p, truth = result.parameters[n], true[n]
+            hits[n] += within
             widths[n].append(p.se / truth)
             errors[n].append(p.value / truth - 1)
     return {
@@ -265,8 +263,8 @@ def covered(
         "seconds": clock.perf_counter() - begun,
         "parameters": {
             n: {
-                "cover_68": inside[n][0] / max(done, 1),
-                "cover_95": inside[n][1] / max(done, 1),
+                "cover_68": hits[n][0] / max(done, 1),
+                "cover_95": hits[n][1] / max(done, 1),
                 "mean_se": float(np.mean(widths[n])),
                 "scatter": float(np.std(errors[n])),
                 "bias": float(np.mean(errors[n])),

@@ -38,6 +38,7 @@ from benchmarks.coverage import (
     trace_of,
     wander,
 )
+from benchmarks.populations import inside, log_uniform
 
 Float = np.ndarray
 #: An answer is wrong if it is more than this many standard errors from the truth.
@@ -45,7 +46,7 @@ WRONG = 4.0
 
 
 def _sizes(random: np.random.Generator, low: float, high: float, n: int) -> Float:
-    size = np.exp(random.uniform(np.log(low), np.log(high), n))
+    size = log_uniform(random, low, high, n)
     return np.asarray(NOISE * size * random.choice([-1.0, 1.0], n))
 
 
@@ -79,7 +80,7 @@ def hum(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float
 
 def line(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
     """A steady line of 0.5 to 10 times the noise at 0.003 to 0.05 of the sampling rate."""
-    hertz = case.rate * np.exp(random.uniform(np.log(0.003), np.log(0.05)))
+    hertz = case.rate * log_uniform(random, 0.003, 0.05)
     size = abs(_sizes(random, 0.5, 10, 1)[0])
     return np.asarray(x + size * np.cos(2 * np.pi * hertz * time + 6.3 * random.random()))
 
@@ -95,7 +96,7 @@ def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> F
 
 def slow(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
     """More noise, of half the size, correlated over 10 to 300 samples."""
-    steps = np.exp(random.uniform(np.log(10), np.log(300)))
+    steps = log_uniform(random, 10, 300)
     # The noise does not depend on its start after 2,000 samples.
     noise = wander(random.normal(size=x.size + 2000), 0.0, steps)
     return np.asarray(x + 0.5 * NOISE * noise[2000:])
@@ -178,9 +179,7 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
         side = (high - p.value if true[n] > p.value else p.value - low) / 1.96
         distances[n] = float((p.value - true[n]) / max(side, 1e-300))
     row["distances"] = distances
-    row["covered"] = {
-        n: bool(p.interval_95[0] <= true[n] <= p.interval_95[1]) for n, p in parameters.items()
-    }
+    row["covered"] = {n: within for n, (_, within) in inside(parameters, true).items()}
     row["se"] = {n: float(p.se / true[n]) for n, p in parameters.items()}
     row["warnings"] = list(result.warnings)
     row["noise"] = {k: v for k, v in result.objective.terms[0].noise.items() if k != "samples"}

@@ -10,7 +10,6 @@ that drift are compared with their mean over the window. A clean recording has n
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -20,6 +19,7 @@ from scipy.signal import lfilter
 import asperity as asp
 from asperity.errors import InputError
 from asperity.recording import Channel, Trace
+from benchmarks.populations import log_uniform, print_wrong, seeds
 
 Float = np.ndarray
 #: A number is wrong if it is more than this many standard uncertainties off. Student's t exceeds
@@ -27,10 +27,6 @@ Float = np.ndarray
 WRONG = 4.5
 W0 = 7.0
 MOST_SAMPLES = 200_000
-
-
-def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 @dataclass
@@ -347,11 +343,7 @@ def judged(seed: int) -> dict:
 
 def main() -> None:
     """Print the number of recordings of each verdict, and those that are wrong and ok."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--recordings", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=0, help="of the first recording")
-    chosen = parser.parse_args()
-    rows = [judged(k) for k in range(chosen.seed, chosen.seed + chosen.recordings)]
+    rows = [judged(k) for k in seeds(__doc__, 500)]
     counts = {
         v: sum(row["verdict"] == v for row in rows) for v in ("ok", "suspicious", "bad", "refused")
     }
@@ -359,9 +351,7 @@ def main() -> None:
     for row in rows:
         wrong = {name: z for name, z in row["errors"].items() if abs(z) > WRONG}
         if row["verdict"] == "ok" and wrong:
-            print(
-                f"wrong and ok: seed {row['seed']}, {', '.join(row['faults']) or 'clean'}: {wrong}"
-            )
+            print_wrong(row["seed"], row["faults"], wrong)
     for row in rows:
         if not row["faults"] and row["verdict"] != "ok":
             print(

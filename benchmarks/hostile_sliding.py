@@ -10,13 +10,12 @@ and hold from `asperity.measure` are compared with the motion without noise, in 
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 
 import asperity as asp
 from asperity.recording import Channel, Trace
 from benchmarks.coverage import integrated
+from benchmarks.populations import log_uniform, print_wrong, seeds
 
 FAULTS = (
     "trend", "random walk", "lines", "coarse friction", "coarse displacement", "spikes", "gear",
@@ -24,10 +23,6 @@ FAULTS = (
 )  # fmt: skip
 #: A number is wrong if it is more than this many half widths of its 95 % interval off.
 WRONG = 2.0
-
-
-def log_uniform(random, low, high):
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 def motion(random, faults):
@@ -70,7 +65,7 @@ def recording(seed):
         walk = np.cumsum(r.normal(size=time.size)) / np.sqrt(time.size)
         friction += log_uniform(r, 3e-4, 5e-3) * walk
     if "lines" in faults:
-        for f in rate * np.exp(r.uniform(np.log(0.003), np.log(0.4), 2)):
+        for f in rate * log_uniform(r, 0.003, 0.4, 2):
             friction += log_uniform(r, 3e-5, 5e-4) * np.sin(2 * np.pi * f * time)
     if "gear" in faults:
         wave = numbers["D0"] * log_uniform(r, 0.5, 20)
@@ -85,7 +80,7 @@ def recording(seed):
         x = step * np.round(x / step)
     if "spikes" in faults:
         at = r.choice(time.size, r.integers(1, 15), replace=False)
-        size = np.exp(r.uniform(np.log(3e-3), np.log(0.3), at.size))
+        size = log_uniform(r, 3e-3, 0.3, at.size)
         friction[at] += r.choice([-1, 1], at.size) * size
     if "loading first" in faults:
         lead = 0.6 / (k * velocities[0])
@@ -136,11 +131,7 @@ def judged(seed):
 
 def main():
     """Print how often intervals contain the truth with verdict ok, and the wrong numbers."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--recordings", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=0, help="of the first recording")
-    chosen = parser.parse_args()
-    rows = [judged(k) for k in range(chosen.seed, chosen.seed + chosen.recordings)]
+    rows = [judged(k) for k in seeds(__doc__, 300)]
     good = [row for row in rows if row["verdict"] == "ok"]
     print(f"{len(good)} of {len(rows)} are ok")
     for name in ("A - B", "healing"):
@@ -149,9 +140,7 @@ def main():
     for row in good:
         wrong = [(name, round(z, 1)) for name, z in row["errors"] if abs(z) > WRONG]
         if wrong:
-            print(
-                f"wrong and ok: seed {row['seed']}, {', '.join(row['faults']) or 'clean'}: {wrong}"
-            )
+            print_wrong(row["seed"], row["faults"], wrong)
 
 
 if __name__ == "__main__":

@@ -26,16 +26,13 @@ import numpy as np
 from asperity.inference import compare, fit, table_of
 from asperity.laws import get_law
 from asperity.orbit import Outcome, response_function
+from benchmarks.populations import inside, log_uniform
 
 #: Rows that are computed together, so that all tables share one compiled program.
 ROWS = 64
 
 #: Free parameters of a comparison, if the law has them.
 FREE = ("mu0", "A", "B", "D0", "eps_ratio", "alpha", "lambda")
-
-
-def log_uniform(rng, low, high, size=None):
-    return np.exp(rng.uniform(np.log(low), np.log(high), size))
 
 
 def drawn_truth(rng, law):
@@ -51,13 +48,13 @@ def drawn_truth(rng, law):
         truth["lambda"] = log_uniform(rng, 1e-7, 3e-6)
     if law == "linker-dieterich":
         truth["alpha"] = rng.uniform(0.05, 0.5)
-    return {name: float(value) for name, value in truth.items()}
+    return truth
 
 
 def fast_point(rng, law):
     """True values, fixed numbers and operating points that the fast method solves."""
     truth = drawn_truth(rng, law)
-    K, W0 = float(log_uniform(rng, 2e4, 2e6)), float(log_uniform(rng, 3, 16))
+    K, W0 = log_uniform(rng, 2e4, 2e6), log_uniform(rng, 3, 16)
     rows = int(rng.integers(30, 61))
     velocities = log_uniform(rng, 1e-7, 1e-4, int(rng.integers(2, 5)))
     frequencies = log_uniform(rng, 1, 1000, int(rng.integers(1, 4)))
@@ -71,10 +68,10 @@ def slow_point(rng, law):
     truth = drawn_truth(rng, law)
     while truth["B"] <= truth["A"]:
         truth = drawn_truth(rng, law)
-    truth["D0"] = float(log_uniform(rng, 2e-7, 5e-6))
-    truth["eps_ratio"] = float(rng.uniform(0.5, 0.95))
-    W0 = float(log_uniform(rng, 3, 16))
-    K = (truth["B"] - truth["A"]) * W0 / truth["D0"] * float(log_uniform(rng, 1.1, 4))
+    truth["D0"] = log_uniform(rng, 2e-7, 5e-6)
+    truth["eps_ratio"] = rng.uniform(0.5, 0.95)
+    W0 = log_uniform(rng, 3, 16)
+    K = (truth["B"] - truth["A"]) * W0 / truth["D0"] * log_uniform(rng, 1.1, 4)
     rows = int(rng.integers(30, 61))
     point = {"V": log_uniform(rng, 3e-7, 1e-5, rows), "frequency": log_uniform(rng, 0.1, 10, rows)}
     point["epsilon"] = rng.uniform(0.02, 0.25, rows)
@@ -142,15 +139,11 @@ def fitted(seed, law, response, drawn=fast_point, *, few=False):
     began = time.process_time()
     result = fit(table, law, list(truth), fixed=fixed)
     seconds = time.process_time() - began
-    inside = {}
-    for name, value in truth.items():
-        p = result.parameters[name]
-        inside[name] = [low <= value <= high for low, high in (p.interval_68, p.interval_95)]
     return {
         "seed": seed,
         "p_value": result.p_value,
         "missed_by": missed_by(result, truth),
-        "inside": inside,
+        "inside": inside(result.parameters, truth),
         "undetermined": result.undetermined,
         "unstable": any("is unstable" in warning for warning in result.warnings),
         "minima": 1 + len(result.optima),

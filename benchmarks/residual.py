@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -18,6 +19,7 @@ from asperity.laws import ElastoPlastic, RiceRuina
 from asperity.orbit import PeriodicResponse
 from asperity.orbit.search import CHOICES
 from asperity.slider.problem import Problem, checked_problem, flatten
+from benchmarks.populations import log_uniform
 
 #: Residual of either equation over its largest term. The waveform has an error of 3e-5 of its
 #: swing, more in its steepest parts, and is differentiated once.
@@ -42,9 +44,7 @@ Numbers = dict[str, np.ndarray]
 def draw(law: str, count: int, seed: int) -> Numbers:
     """Operating points (SI) over the whole range of the package, each (count,)."""
     random = np.random.default_rng(seed)
-
-    def spread(low: float, high: float) -> np.ndarray:
-        return np.exp(random.uniform(np.log(low), np.log(high), count))
+    spread = partial(log_uniform, random, size=count)
 
     numbers = {"mu0": random.uniform(0.4, 0.8, count), "A": spread(0.002, 0.05)}
     numbers |= {"D0": spread(1e-7, 2e-6), "W0": spread(3.0, 16.0), "V0": np.full(count, 1e-6)}

@@ -20,6 +20,7 @@ from asperity.laws import RiceRuina
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.questions.recording import Measurement
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
+from benchmarks.populations import inside
 from benchmarks.stick_slip_recordings import repeated, trace_of
 
 W0, CYCLES = 1.0, 40
@@ -61,13 +62,10 @@ def judged(seed, free, spread, velocities):
     fixed = {n: v for n, v in truth.items() if n not in free}
     start = time.process_time()
     result = fit(cycles, "rice-ruina", free, fixed={**fixed, "V0": V}, starts=16)
-    inside = {}
-    for name in free:
-        low, high = result.parameters[name].interval_95
-        inside[name] = bool(low <= truth[name] <= high)
+    within = inside(result.parameters, {name: truth[name] for name in free})
     return {
         "seed": seed,
-        "inside": inside,
+        "inside": {name: whole for name, (_, whole) in within.items()},
         "width": {
             n: float(np.log(p.interval_95[1] / p.interval_95[0])) if p.interval_95[0] else np.inf
             for n, p in result.parameters.items()
