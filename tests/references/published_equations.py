@@ -297,10 +297,16 @@ def one_period(p: Printed, start: np.ndarray, epsilon: float) -> np.ndarray:
     return np.array(states)
 
 
-def periodic_response(p: Printed, epsilon: float) -> np.ndarray:
-    """Change of the mean and complex harmonics 1 and 2 of F/W0, as (mean, c1, c2)."""
+def periodic_response(p: Printed, epsilon: float, drop: float = 0.0) -> np.ndarray:
+    """Change of the mean and complex harmonics 1 and 2 of F/W0, as (mean, c1, c2).
+
+    Newton's method starts where F/W0 is lower by `drop` than in steady sliding.
+    """
     free = p.scale > 0  # rigid asperities have no elastic displacement
     scale, start = p.scale[free], p.steady
+    start[0] -= drop * p.W0 / p.K
+    if p.M:
+        start[-1] -= drop * p.lambda_
     for _ in range(12):
         orbit = one_period(p, start, epsilon)
         gap = ((orbit[-1] - start)[free]) / scale

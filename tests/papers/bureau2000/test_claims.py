@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import jv
 
@@ -329,73 +329,18 @@ def test_negligible_inertia_would_be_reproduced(model):
 
 # --- Key numbers, from the paper's equations and SciPy alone -------------------------------------
 
-MU0, A, B, D0, V0, K, W0, M, LENGTH = 0.5, 0.013, 0.026, 4e-7, 1e-6, 2e5, 7.0, 1.6, 7e-7
+MU0, A, B, D0, K, W0, M = 0.5, 0.013, 0.026, 4e-7, 2e5, 7.0, 1.6
 OMEGA = 2 * np.pi * 120
 
 
-def _periodic(rates, start, scale):
-    """Harmonics 0, 1, 2 of the first state of the periodic solution, by shooting with LSODA."""
-
-    def flow(state, samples):
-        times = np.linspace(0, 2 * np.pi / OMEGA, samples + 1)
-        run = solve_ivp(
-            rates, times[[0, -1]], state, "LSODA", t_eval=times, rtol=1e-10, atol=1e-13 * scale
-        )
-        return run.y
-
-    for _ in range(15):
-        gap = flow(start, 1)[:, -1] - start
-        moved = [flow(start + 1e-5 * s, 1)[:, -1] for s in np.diag(scale)]
-        columns = [(end - start - gap) / 1e-5 for end in moved]
-        step = np.linalg.solve(np.diag(scale) - np.array(columns).T, gap)
-        start = start + step * scale
-        if np.abs(step).max() < 1e-8:
-            break
-    spectrum = np.fft.fft(flow(start, 64)[0, :-1]) / 64
-    return spectrum[0].real, 2 * abs(spectrum[1]), 2 * abs(spectrum[2])
-
-
-def _load(t, epsilon):
-    return W0 * (1 + epsilon * np.cos(OMEGA * t))
-
-
-def _elastic_rates(V, epsilon, inertia):
-    """Extension, age, elastic displacement of the asperities (and velocity), in SI.
-
-    The asperities carry W e/lambda: no derivative of the load is needed.
-    """
-
-    def plastic(e, age):
-        return V0 * np.exp(min((e / LENGTH - MU0 - B * np.log(V0 * age / D0)) / A, 300.0))
-
-    def heavy(t, state):
-        d, age, e, v = state
-        force = _load(t, epsilon) * e / LENGTH
-        return [V - v, 1 - v * age / D0, v - plastic(e, age), (K * d - force) / M]
-
-    def light(t, state):
-        # F = K d = W e/lambda fixes e; d' = V - v and e' = v - plastic then fix v.
-        d, age = state
-        W, dW = _load(t, epsilon), -W0 * epsilon * OMEGA * np.sin(OMEGA * t)
-        ratio = K * LENGTH / W
-        e = ratio * d
-        v = (plastic(e, age) + ratio * V - e * dW / W) / (1 + ratio)
-        return [V - v, 1 - v * age / D0]
-
-    return heavy if inertia else light
-
-
-def _elastic_response(V, epsilon, inertia):
-    mu = MU0 - (B - A) * np.log(V / V0)
-    start = np.array([(mu - 0.1) * W0 / K, D0 / V, (mu - 0.1) * LENGTH, V])
-    scale = np.array([A * W0 / K, D0 / V, A * LENGTH, V])
-    size = 4 if inertia else 2
-    mean, first, second = _periodic(_elastic_rates(V, epsilon, inertia), start[:size], scale[:size])
-    return np.array([mean * K / W0 - mu, first * K / W0, second * K / W0])
-
-
-def test_the_effect_of_inertia_agrees_with_shooting_by_scipy(claims):
-    light, heavy = (_elastic_response(1e-6, 0.24, inertia) for inertia in (False, True))
+def test_the_effect_of_inertia_agrees_with_shooting_by_scipy(claims, reference):
+    mean, *harmonics = np.transpose(
+        [
+            reference.periodic_response(reference.Printed(lambda_=7e-7, M=mass), 0.24, drop=0.1)
+            for mass in (0.0, M)
+        ]
+    )
+    light, heavy = np.transpose([mean.real, *np.abs(harmonics)])
     changes = claims["inertia-negligible-elastic"].numbers
     names = ["drop, 1 um/s", "mu1, 1 um/s", "mu2, 1 um/s"]
     assert heavy / light - 1 == pytest.approx([changes[n] for n in names], abs=1e-4)
@@ -453,24 +398,21 @@ def test_the_threshold_of_stick_slip_agrees_with_eigenvalues(claims):
     assert growth(K) > 0
 
 
+def borne(frequency, R):
+    """eps_eff/eps on the air under a disc of radius R (m), or in vacuum without one."""
+    P0, h0, eta, lambda_z, omega = 1e5, 6.5e-6, 1e-5, 4e-7, 2 * np.pi * frequency
+    z = (1 - 1j) / np.sqrt(2) * np.sqrt(12 * eta * omega / (P0 * h0**2)) * R
+    air = np.pi * R**2 * P0 / W0 * lambda_z / h0 * jv(2, z) / jv(0, z) if R else 0.0
+    return 1 / abs(1 - omega**2 * lambda_z * M / W0 - air)
+
+
 def test_the_borne_fraction_agrees_with_bessel_functions(claims):
-    P0, h0, eta, R, lambda_z = 1e5, 6.5e-6, 1e-5, 3.9e-2, 4e-7
-    z = (1 - 1j) / np.sqrt(2) * np.sqrt(12 * eta * OMEGA / (P0 * h0**2)) * R
-    air = np.pi * R**2 * P0 / W0 * lambda_z / h0 * jv(2, z) / jv(0, z)
-    fraction = 1 / abs(1 - OMEGA**2 * lambda_z * M / W0 - air)
+    fraction = borne(120, 3.9e-2)
     assert claims["borne-fraction-120"].numbers["120 Hz"] == pytest.approx(fraction, rel=1e-12)
 
 
 def test_one_disc_explains_the_transmission_in_air_and_vacuum(claims):
     """The disc that gives 0.48 at 120 Hz gives the 0.4 of air over vacuum at 200 Hz."""
-    P0, h0, eta, lambda_z = 1e5, 6.5e-6, 1e-5, 4e-7
-
-    def borne(frequency, R):
-        omega = 2 * np.pi * frequency
-        z = (1 - 1j) / np.sqrt(2) * np.sqrt(12 * eta * omega / (P0 * h0**2)) * R
-        air = np.pi * R**2 * P0 / W0 * lambda_z / h0 * jv(2, z) / jv(0, z) if R else 0.0
-        return 1 / abs(1 - omega**2 * lambda_z * M / W0 - air)
-
     R = brentq(lambda R: borne(200, R) / borne(200, 0.0) - 0.4, 0.01, 0.039)
     assert borne(120, R) == pytest.approx(0.477, abs=1e-3)
     assert borne(200, R) == pytest.approx(claims["transmission-200-Hz"].numbers["200 Hz"], rel=1e-9)
