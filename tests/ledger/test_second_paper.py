@@ -34,6 +34,13 @@ def installed(tmp_path, monkeypatch):
     return site / "toy_papers_2020"
 
 
+def changed(file, old, new):
+    """Replace a part of a file of the paper."""
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
 def test_papers_are_found_in_their_folders_and_by_entry_points(installed):
     assert {"bureau2000", "toy2020"} <= set(available())
     assert find_paper("toy2020").contents.paper.short == "Toy (2020)"
@@ -98,22 +105,30 @@ def test_the_page_of_the_browser_has_the_second_paper_by_its_name(installed):
     ],
 )
 def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
-    words = installed / "claims.toml"
-    text = words.read_text(encoding="utf-8")
-    assert old in text
-    words.write_text(text.replace(old, new, 1), encoding="utf-8")
+    changed(installed / "claims.toml", old, new)
     with pytest.raises(InputError, match=message):
         _ = find_paper("toy2020").contents
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("9.80665 * numbers.M", "1 / 0", "'weight' must be code that runs"),
+        ("9.80665", "float('nan')", "must compute finite numbers, got nan"),
+        ('{"weight": 9.80665 * numbers.M}', "9.8", "that returns numbers by name"),
+        ("import math", "import nothing_here", "toy_papers_2020.checks must be code"),
+    ],
+)
+def test_a_mistake_in_the_checks_is_one_sentence(installed, old, new, message):
+    changed(installed / "checks.py", old, new)
+    with pytest.raises(InputError, match=message):
+        find_paper("toy2020").ledger()
+
+
+@pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
-        ("checks.py", "9.80665 * numbers.M", "1 / 0", "'weight' must be code that runs"),
-        ("checks.py", "9.80665", "float('nan')", "must compute finite numbers, got nan"),
-        ("checks.py", '{"weight": 9.80665 * numbers.M}', "9.8", "that returns numbers by name"),
         ("claims.toml", "{weight:.1f}", "{wight:.1f}", "got '{wight}'; did you mean 'weight'?"),
-        ("checks.py", "import math", "import nothing_here", "toy_papers_2020.checks must be code"),
         (
             "figures.py",
             "return figure_words",
@@ -127,10 +142,10 @@ def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
         ("figures.py", "FIGURES = (swing,)", "FIGURES = swing", "must have FIGURES, a tuple of"),
     ],
 )
-def test_a_mistake_in_the_code_is_one_sentence(installed, tmp_path, file, old, new, message):
-    text = (installed / file).read_text(encoding="utf-8")
-    assert old in text
-    (installed / file).write_text(text.replace(old, new, 1), encoding="utf-8")
+def test_a_mistake_of_a_figure_or_sentence_is_one_line(
+    installed, tmp_path, file, old, new, message
+):
+    changed(installed / file, old, new)
     out = tmp_path / "report"
     refused(CliRunner().invoke(main, ["reproduce", "toy2020", "--out", str(out)]), message)
     assert not out.exists()

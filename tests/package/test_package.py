@@ -45,50 +45,47 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = asperity.sliders
 
 
-CONFIGURE = (
-    "import jax\nfrom asperity._jax import configure\nfolder = configure()\n"
-    "assert configure() is folder\nassert jax.numpy.ones(1).dtype == 'float64'\n"
-    "jax.jit(lambda x: x * 3 + 1)(2.0)\nprint(folder)"
-)
+CONFIGURE = """
+import jax
+chosen = None
+{}
+from asperity._jax import configure
+folder = configure()
+assert configure() is folder
+assert jax.numpy.ones(1).dtype == "float64"
+jax.jit(lambda x: x * 3 + 1)(2.0)
+print(folder)
+print(jax.config.jax_default_device is chosen or jax.config.jax_default_device)
+"""
+
+#: By case: Python before `configure`, the environment, the folder of programs and the device.
+STARTS = {
+    "nothing said": ("", {"JAX_COMPILATION_CACHE_DIR": "{}/chosen"}, "{}/chosen", "cpu"),
+    "platform chosen, the user's cache folder": (
+        "",
+        {"JAX_PLATFORMS": "cpu", "XDG_CACHE_HOME": "{}"},
+        "{}/asperity/jax",
+        "True",
+    ),
+    "device chosen, no writable folder": (
+        "chosen = jax.devices()[0]; jax.config.update('jax_default_device', chosen)",
+        {"JAX_COMPILATION_CACHE_DIR": "{}/file/below"},
+        "None",
+        "True",
+    ),
+}
 
 
-DEVICE = (
-    "import jax\nchosen = None\n{}\nfrom asperity._jax import configure\nconfigure()\n"
-    "print(jax.config.jax_default_device is chosen or jax.config.jax_default_device)"
-)
-
-
-@pytest.mark.parametrize(
-    ("before", "platforms", "after"),
-    [
-        ("", "", "cpu"),
-        ("", "cpu", "True"),
-        ("chosen = jax.devices()[0]; jax.config.update('jax_default_device', chosen)", "", "True"),
-    ],
-    ids=["nothing said", "platform chosen", "device chosen"],
-)
-def test_programs_run_on_the_cpu_unless_another_device_is_chosen(
-    before: str, platforms: str, after: str
-) -> None:
-    assert run(DEVICE.format(before), JAX_PLATFORMS=platforms) == after
-
-
-def test_compiled_programs_are_kept(tmp_path: Path) -> None:
-    chosen = tmp_path / "chosen"
-    assert run(CONFIGURE, JAX_COMPILATION_CACHE_DIR=str(chosen)) == str(chosen)
-    assert any(chosen.iterdir())
-
-
-def test_the_cache_follows_the_users_cache_folder(tmp_path: Path) -> None:
-    folder = run(CONFIGURE, JAX_COMPILATION_CACHE_DIR="", XDG_CACHE_HOME=str(tmp_path))
-    assert folder == str(tmp_path / "asperity" / "jax")
-    assert any(Path(folder).iterdir())
-
-
-def test_without_a_writable_folder_there_is_no_cache(tmp_path: Path) -> None:
-    blocked = tmp_path / "file"
-    blocked.write_text("", encoding="utf-8")
-    assert run(CONFIGURE, JAX_COMPILATION_CACHE_DIR=str(blocked / "below")) == "None"
+@pytest.mark.parametrize("case", STARTS)
+def test_where_compiled_programs_are_kept_and_run(tmp_path: Path, case: str) -> None:
+    """On the CPU unless another device is chosen, and in a cache wherever that can be written."""
+    before, environment, folder, device = STARTS[case]
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    given = {name: value.format(tmp_path) for name, value in environment.items()}
+    unset = {"JAX_COMPILATION_CACHE_DIR": "", "JAX_PLATFORMS": ""}
+    folder = folder.format(tmp_path)
+    assert run(CONFIGURE.format(before), **unset | given).splitlines() == [folder, device]
+    assert folder == "None" or any(Path(folder).iterdir())
 
 
 @pytest.mark.parametrize(("used", "times"), [(40_000, 1), (10_000, 0)])

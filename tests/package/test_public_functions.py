@@ -125,9 +125,7 @@ def test_a_slider_shows_its_parameters_with_units(slider):
 
 
 def test_results_show_ranges_and_counts(slider):
-    response = asp.periodic_response(
-        slider, velocity=V0, epsilon=[0.05, 0.24], frequency=120.0, waveform=4096
-    )
+    response = asp.periodic_response(slider, velocity=V0, epsilon=[0.05, 0.24], frequency=120.0)
     text, rows = shown(response)
     assert "2 points" in text
     assert rows["epsilon"] == "0.05 to 0.24 (2,)"
