@@ -25,26 +25,14 @@ ROW = "rice-ruina,1e-6,0.2,120"
     ("option", "value", "parts"),
     [
         ("-V", "1 um", ["-V must be a velocity (m/s), got '1 um'"]),
-        ("-V", "0 um/s", ["-V must be positive, got 0 m/s"]),
-        ("-V", "nan um/s", ["-V must be a finite number with a unit, got 'nan um/s'"]),
         ("-f", "754 rad/s", ["-f must be a frequency (Hz)", "angular", "120 Hz"]),
         ("-f", "120", ["-f must carry a unit, got '120'"]),
-        ("-f", "120 1/s", ["-f must be a frequency (Hz), got '120 1/s'"]),
-        ("-f", "7200 rpm", ["-f must be a frequency (Hz), got '7200 rpm'"]),
         ("-e", "1", ["-e must be at least 0 and below 1", "got 1;"]),
-        ("-e", "1.5", ["-e must be at least 0 and below 1", "got 1.5;"]),
         ("-e", "0.2 N", ["-e must be a pure number, got '0.2 N'"]),
         ("--material", "none.toml", ["--material must be a file"]),
-        ("--set", "A=0", ["--set A must be positive, got 0;"]),
         ("--set", "D0=0 um", ["--set D0 must be positive, got 0 m;"]),
-        ("--set", "D0=0.4", ["--set D0 must carry a unit, got '0.4'"]),
-        ("--set", "D0=0.4 s", ["--set D0 must be a length (m), got '0.4 s'"]),
-        ("--set", "W0=0 N", ["--set W0 must be positive, got 0 N;"]),
-        ("--set", "W0=7 kg", ["--set W0 must be a force (N), got '7 kg'"]),
         ("--set", "inertia=2", ["--set inertia must be 1 or 0, got 2;"]),
-        ("--set", "A=0.01 m", ["--set A must be a pure number, got '0.01 m'"]),
         ("--set", "alpa=0.2", ["--set alpa must be a known name, got 'alpa'", "'alpha'"]),
-        ("--set", "alpha=0.2", ["rice-ruina must be given its own", "'alpha'", "linker-dieterich"]),
         ("--set", "A", ["--set must be NAME=VALUE, got 'A'"]),
         ("--set", "=1", ["--set must be NAME=VALUE, got '=1'"]),
         ("--set", "V=2 um/s", ["V must be given once, got '2 um/s' and '1 um/s'"]),
@@ -53,6 +41,7 @@ ROW = "rice-ruina,1e-6,0.2,120"
     ],
 )
 def test_a_bad_option(asperity, option: str, value: str, parts: list[str]) -> None:
+    """`tests/app/test_doors.py` sends other bad numbers of a point through this command."""
     options = {OF[1]: OF[2]} | POINT | {option: value}
     refused(asperity(OF[0], *(text for pair in options.items() for text in pair)), *parts)
 
