@@ -20,6 +20,7 @@ from asperity.cli.options import FieldOption
 from asperity.cli.shell import Shell
 from asperity.questions.fit import Estimation, Fit, FitOptions
 from references.commands import refused
+from references.populations import population
 
 HEAVY = ("jax", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
 
@@ -170,7 +171,7 @@ main(["sweep", sys.argv[2], "--out", sys.argv[3], "--workers", "1"])
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", population([signal.SIGTERM, signal.SIGINT]))
 def test_a_stopped_sweep_is_one_sentence_and_leaves_no_lock(tmp_path, number) -> None:
     plan, out = tmp_path / "plan.toml", tmp_path / "s.zarr"
     plan.write_text(

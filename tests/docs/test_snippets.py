@@ -32,7 +32,7 @@ SLOW = {
     *("docs/healing.md", "docs/fitting.md", "docs/theory/continuation.md"),
     *("docs/tutorials/faults_and_tides.md", "docs/tutorials/vibration.md", "docs/modulations.md"),
     *("docs/theory/inertia.md", "docs/stick_slip.md", "docs/write_your_own_load.md"),
-    *("docs/write_your_own_law.md", "docs/running_experiments.md"),
+    *("docs/write_your_own_law.md", "docs/running_experiments.md", "docs/results.md"),
 }
 #: Pages that `tests/papers/bureau2000/test_claims.py` runs, with its computed ledger.
 ELSEWHERE = {"docs/claims.md"}
