@@ -194,15 +194,18 @@ class Machine:
         velocity: Any,
         applied: Any,
         frequency: float | None = None,
+        *,
+        inertia: bool = False,
         **overrides: Any,
     ) -> PeriodicResponse:
-        """Quasi-static response at eps_eff = 0.48 times `applied`."""
+        """Response at eps_eff = 0.48 times `applied`."""
         p = self.numbers
         return periodic_response(
             self.slider(law, **overrides),
             velocity=velocity,
             epsilon=p.transmission * np.asarray(applied),
             frequency=p.frequency if frequency is None else frequency,
+            inertia=inertia,
         )
 
     def curve(self, law: str, **overrides: float) -> PeriodicResponse:
@@ -213,18 +216,10 @@ class Machine:
             lambda: self.response(law, V, applied, **overrides),
         )
 
+    @cached_property
     def with_inertia(self) -> PeriodicResponse:
         """Response of the elasto-plastic law at eps = 0.5 with the slider's inertia."""
-        return self._once(
-            "inertia",
-            lambda: periodic_response(
-                self.slider(EXT),
-                velocity=np.array(self.velocities),
-                epsilon=self.strongest,
-                frequency=self.numbers.frequency,
-                inertia=True,
-            ),
-        )
+        return self.response(EXT, np.array(self.velocities), STRONGEST, inertia=True)
 
     def transfer(
         self, V: float, omega: float, lambda_: float = 0.0, alpha: float = 0.0, M: float = 0.0
@@ -247,7 +242,7 @@ class Machine:
         def observable(name: str) -> Callable[..., float]:
             def value(law: Law, speed: int, applied: float = STRONGEST) -> float:
                 if law.inertia:
-                    return float(getattr(self.with_inertia(), name)[speed])
+                    return float(getattr(self.with_inertia, name)[speed])
                 response = self.curve(law.name, **law.overrides)
                 return at(getattr(response, name), STRONGEST if law.strongest else applied)[speed]
 
@@ -317,12 +312,12 @@ class Machine:
 
     def small_modulation(self, V: float, **overrides: float) -> SmallModulation:
         """Arguments of the closed forms; rigid asperities, no inertia."""
-        return SmallModulation(**self._point(V, **overrides))
+        omega = 2 * np.pi * self.numbers.frequency
+        return SmallModulation(**{"omega": omega} | self._point(V, **overrides))
 
     def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
         """Arguments of the reference integration; rigid asperities, no inertia."""
-        numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
-        return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
+        return IntegratedPoint(**self._point(V, **overrides), frequency=self.numbers.frequency)
 
     def orbit(self, point: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
         """A periodic orbit of the reference integration, integrated once."""
@@ -330,9 +325,8 @@ class Machine:
 
     def _point(self, V: float, **overrides: float) -> dict[str, Any]:
         p = self.numbers
-        point: dict[str, Any] = {"A": p.A, "B": p.B, "D0": p.D0, "K": p.K, "W0": p.W0}
-        point |= {"V": V, "omega": 2 * np.pi * p.frequency}
-        point |= overrides
+        point: dict[str, Any] = {n: p[n].si for n in ("A", "B", "D0", "K", "W0")}
+        point |= {"V": V} | overrides
         point.setdefault("mu", p.mu0 - (point["B"] - point["A"]) * float(np.log(V / p.V0)))
         return point
 
