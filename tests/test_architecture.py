@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -95,9 +96,9 @@ def room_of(module: Path, package: Path = PACKAGE) -> str:
     return module.relative_to(package).parts[0].removesuffix(".py")
 
 
-def imported_rooms(source: str) -> Iterator[tuple[str, int]]:
+def imported_rooms(module: Path) -> Iterator[tuple[str, int]]:
     """Rooms that a module imports, with the line; imports inside functions count."""
-    for node in _running(ast.parse(source)):
+    for node in running_imports(module):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
@@ -112,6 +113,13 @@ def imported_rooms(source: str) -> Iterator[tuple[str, int]]:
             head, *rest = name.split(".")
             if head == "asperity":
                 yield (rest[0] if rest else "__init__"), node.lineno
+
+
+@cache
+def running_imports(module: Path) -> list[ast.Import | ast.ImportFrom]:
+    """Imports of a module that run."""
+    nodes = _running(ast.parse(module.read_text(encoding="utf-8")))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
 def _running(node: ast.AST) -> Iterator[ast.AST]:
@@ -129,7 +137,7 @@ def wrong_imports(package: Path) -> list[str]:
     wrong = []
     for module in sorted(package.rglob("*.py")):
         room = room_of(module, package)
-        for target, line in imported_rooms(module.read_text(encoding="utf-8")):
+        for target, line in imported_rooms(module):
             if target != room and target not in MAY_IMPORT.get(room, set()):
                 wrong.append(f"{module.relative_to(package)}:{line}: {room} -> {target}")
     return wrong
@@ -144,7 +152,7 @@ def imports_within(room: Path, package: Path = PACKAGE) -> dict[str, set[str]]:
         if part == "__init__":
             continue
         parts = imports.setdefault(part, set())
-        for node in _running(ast.parse(module.read_text(encoding="utf-8"))):
+        for node in running_imports(module):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(inside):
                 target = (node.module or "").removeprefix(inside).split(".")[0]
                 parts |= {target} - {part}
