@@ -1,7 +1,5 @@
 """The borne fraction of the modulation: limits, signs, invariances, an independent simulation."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -186,8 +184,3 @@ def test_bad_input_is_answered_by_one_sentence(change, message):
     arguments = {"frequency": 120.0, **SLIDER, "layer": LAYER, **change}
     with pytest.raises(InputError, match=message):
         effective_modulation(arguments.pop("frequency"), **arguments)
-
-
-def test_import_needs_no_scipy():
-    code = "import asperity.air, sys; sys.exit('scipy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -26,12 +26,33 @@ def run(script: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
-def test_importing_the_package_loads_nothing_heavy() -> None:
-    script = (
-        "import sys, asperity; asperity.__version__\n"
-        "print([m for m in ('jax', 'numpy', 'pint', 'pydantic', 'scipy') if m in sys.modules])"
-    )
-    assert run(script) == "[]"
+#: Rooms from the lightest to the heaviest; what is not loaded after one was not loaded before.
+LOADED = """
+import sys
+
+def absent(*names):
+    assert [name for name in names if name in sys.modules] == []
+
+import asperity
+asperity.__version__
+absent("jax", "numpy", "pint", "pydantic", "scipy")
+from asperity.units import to_si
+to_si("1 um/s", "velocity", "x")
+to_si("120 Hz", "frequency", "x")
+import asperity.parameters
+import asperity.materials
+absent("jax", "pint", "pydantic")
+assert asperity.materials.load("bureau2000").K == 2e5
+absent("jax", "pint")
+import asperity.air
+absent("scipy")
+to_si("1 inch/s", "velocity", "x")  # an unusual spelling
+assert "pint" in sys.modules
+"""
+
+
+def test_a_room_loads_nothing_heavy_that_it_does_not_need() -> None:
+    run(LOADED)
 
 
 @pytest.mark.parametrize("name", asperity.__all__)

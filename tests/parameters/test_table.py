@@ -1,7 +1,5 @@
 """The table of parameters: one name each, rules, and laws from outside the package."""
 
-import subprocess
-import sys
 from typing import ClassVar
 
 import equinox as eqx
@@ -156,14 +154,6 @@ def test_values_are_read_and_set_where_the_equations_have_them(inertia: bool, et
         assert float(value_of(changed, p)) == pytest.approx(3.0, rel=1e-15)
         others = {n: float(value_of(changed, q)) for n, q in known.items() if n != name}
         assert others == {n: value for n, value in values.items() if n != name}
-
-
-def test_the_table_is_read_without_jax() -> None:
-    script = "import sys, asperity.parameters; print('jax' in sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "False"
 
 
 def test_every_kind_and_rule_is_known() -> None:
