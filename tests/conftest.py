@@ -44,7 +44,7 @@ BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 #: with few optimisations would take them several times as long.
 BRIEF = (
     *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "study/"),
-    *("papers/bureau2000/", "fit_report/", "examples/", "samples/"),
+    *("papers/bureau2000/", "fit_report/", "examples/", "samples/", "loads/", "figures/"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
     *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
     *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
