@@ -64,6 +64,17 @@ def test_unmodulated_sliding_is_unstable_at_the_central_values(figure):
     assert figure.scalars["steady 1e-06"] == pytest.approx(1.00125995, abs=1e-8)
 
 
+@pytest.mark.parametrize(("variant", "lambda_"), [("RR", 0.0), ("EXT", 7e-7)])
+@pytest.mark.parametrize(("speed", "V"), [("1 um/s", 1e-6), ("10 um/s", 1e-5)])
+def test_unmodulated_sliding_grows_by_its_eigenvalue(figure, reference, variant, lambda_, speed, V):
+    p, step = reference.Printed(V=V, lambda_=lambda_), 1e-30
+    columns = [np.imag(p.rates(0.0, p.steady + 1j * step * e, 0.0)) / step for e in np.eye(2)]
+    growth = np.linalg.eigvals(np.transpose(columns)).real.max()
+    first = figure.curve(f"{variant}, {speed}").iloc[0]
+    assert first["epsilon_eff"] == 0
+    assert first["floquet_max"] == pytest.approx(np.exp(growth / 120), rel=1e-10)
+
+
 def test_a_threshold_outside_its_bracket_is_nan():
     V = np.array([1e-6])
     epsilon = stability.thresholds(Machine(), "RR", V, (np.array([0.02]), np.array([0.05])))
