@@ -208,7 +208,7 @@ class Machine:
             inertia=inertia,
         )
 
-    def curve(self, law: str, **overrides: float) -> PeriodicResponse:
+    def curve(self, law: str, **overrides: Any) -> PeriodicResponse:
         """Response at the two velocities (axis 0) and at `APPLIED` (axis 1), 120 Hz."""
         V, applied = np.array(self.velocities)[:, None], np.array(APPLIED)[None]
         return self._once(
