@@ -6,7 +6,7 @@ import pytest
 
 from asperity import materials
 from asperity.errors import InputError
-from asperity.ledger import Contents, check, fill, judge_claims, rules
+from asperity.ledger import Contents, check, fill, judge_claims, printed_numbers, rules
 from asperity.ledger.claims import computed_numbers, formula_verdict, judge
 from asperity.ledger.contents import About, Entry, RuleWords
 from asperity.ledger.sentences import names_in
@@ -29,6 +29,8 @@ def entry(accept="about", kind="test", depends_on=(), judged=(), computed="x", *
         (rules.about(20.0), [19.0, 21.0], [18.9, 21.1]),
         (rules.about(-20.0), [-19.0], [19.0, -18.9]),
         (rules.of_order(1e-3), [3.2e-4, 3.1e-3], [3.1e-4, 3.2e-3, -1e-3, 0.0]),
+        (rules.of_order(-1e-3), [-3.2e-4], [-3.1e-4, 1e-3, 0.0]),
+        (rules.of_order(0.0), [], [0.0, 1.0]),
         (rules.below(0.1, "x"), [0.0, -1.0, 0.09], [0.1, 1.0]),
         (rules.above(10, "x"), [10.1], [10.0, -11.0]),
         (rules.between(0.1, 0.2, "x"), [0.1, 0.2], [0.0999, 0.2001]),
@@ -102,6 +104,12 @@ def test_a_formula_is_decided_by_the_independent_number(printed, derived, verdic
 def test_a_formula_of_printed_numbers(formula, expected):
     numbers = {"a": 6.0, "b.high": 4.0, "lambda": 5.0}
     assert rules.formula_value(formula, numbers, "x") == pytest.approx(expected, rel=1e-15)
+
+
+def test_a_list_of_one_number_is_its_first_and_its_last():
+    one = NUMBERS["V_data"].model_copy(update={"values": (3.0,)})
+    numbers = NUMBERS.model_copy(update={"numbers": {"V_data": one}})
+    assert printed_numbers(numbers) == {"V_data.first": 3e-6, "V_data.last": 3e-6}
 
 
 def test_a_formula_names_terms_of_the_model():

@@ -361,7 +361,8 @@ def printed_numbers(numbers: Material) -> dict[str, float]:
         if number.si_range is not None:
             stated[f"{name}.low"], stated[f"{name}.high"] = number.si_range
         if number.si_values:
-            stated[f"{name}.first"], *_, stated[f"{name}.last"] = number.si_values
+            stated[f"{name}.first"] = number.si_values[0]
+            stated[f"{name}.last"] = number.si_values[-1]
         if number.si_uncertainty is not None:
             stated[f"{name}.uncertainty"] = number.si_uncertainty
     return stated

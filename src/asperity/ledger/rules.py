@@ -110,10 +110,10 @@ def within(stated: float, tolerance: float, what: str = "the value") -> Acceptan
 
 @typed
 def of_order(stated: float, what: str = "the value") -> AcceptanceRule:
-    """Within half a decade."""
+    """Within half a decade, of the same sign."""
     return AcceptanceRule(
         f"{what} within half a decade of {stated:g}",
-        lambda value: value > 0 and abs(math.log10(value / stated)) <= HALF_A_DECADE,
+        lambda v: v * stated > 0 and abs(math.log10(v / stated)) <= HALF_A_DECADE,
     )
 
 
