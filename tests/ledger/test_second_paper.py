@@ -71,6 +71,7 @@ def test_the_second_paper_is_reproduced_by_its_name(installed, tmp_path):
     shown = CliRunner().invoke(main, ["reproduce", "toy2020", "--out", str(out)])
     assert shown.exit_code == 0, shown.output
     assert "Toy (2020), reproduced by asperity" in shown.output
+    assert "solved" not in shown.output  # its figure shows instants, and no operating point
     files = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()}
     pictures = {"figures/swing.png", "figures/swing.pdf", "data/swing.csv"}
     assert files == {"index.html", "claims.json", "claims.csv", *pictures}

@@ -283,6 +283,8 @@ class FiguresFile(Question):
             _minus(fill(text, numbers.numbers, f"figures.{numbers.name}"))
             for text in (words.caption, words.alt)
         )
+        # Rows without an outcome are instants, or values of a formula.
+        solved = len(numbers.data) if "converged" in numbers.data else 0
         made = []
         for name, (data, header) in tables.items():
             of_points = self.point_column if data is numbers.points else {}
@@ -290,7 +292,7 @@ class FiguresFile(Question):
         return PaperFigure(
             numbers.name, words.place, words.title, caption, alt,
             draw=lambda: (draw or words.draw)(numbers),
-            tables=made, points=len(numbers.data), failed=numbers.failed,
+            tables=made, points=solved, failed=numbers.failed,
         )  # fmt: skip
 
 

@@ -76,9 +76,10 @@ class ReproductionSummary:
         """Lines of the table that the command prints."""
         tests = ", ".join(f"{count} {verdict}" for verdict, count in self.tests.items())
         tested = count_text(sum(self.tests.values()), "test")
+        failed = f", {self.failed} failed" if self.failed else ""
         rows = [
             ("figures", f"{self.figures} in figures/ (PNG, PDF), their numbers in data/ (CSV)"),
-            ("solved", f"{self.points} points" + (f", {self.failed} failed" * bool(self.failed))),
+            *([("solved", f"{self.points} points{failed}")] if self.points else []),
             ("claims", f"{self.claims}, of which {tested}: {tests}"),
             *(("points", one.text) for one in self.agreement if not one.figure),
             ("time", f"{self.seconds:.1f} s"),
