@@ -17,10 +17,6 @@ def draw(numbers):
     return WORDS.figures[numbers.name].draw(numbers)
 
 
-def end(figure, curve, column):
-    return figure.curve(curve)[column].iloc[-1]
-
-
 def test_every_point_is_solved(figures):
     assert {name: figure.failed for name, figure in figures.items() if figure.failed} == {}
 
@@ -106,9 +102,9 @@ def test_drops_in_air_and_vacuum_of_figure_5_collapse(figures):
     assert last["1 mbar"] == pytest.approx(0.5 * vacuum, rel=1e-12)
     assert last["1 atm"] == pytest.approx(0.4 * 0.5 * vacuum, rel=1e-12)
     assert (figure.data["frequency"] == 200).all()
-    assert end(figure, "1 mbar", "delta_mu") < end(figure, "1 atm", "delta_mu") < 0
+    assert figure.last("1 mbar", "delta_mu") < figure.last("1 atm", "delta_mu") < 0
     # 2 f is at the resonance of the slider on its asperities.
-    assert end(figure, "1 atm, inertia", "delta_mu") < 2 * end(figure, "1 atm", "delta_mu")
+    assert figure.last("1 atm, inertia", "delta_mu") < 2 * figure.last("1 atm", "delta_mu")
     air, vacuum = figure.curve("1 atm"), figure.curve("1 mbar")
     collapsed = np.interp(
         air["epsilon_applied"] / 2.5, vacuum["epsilon_applied"], vacuum["delta_mu"]
@@ -134,8 +130,8 @@ def test_rice_ruina_harmonics_are_proportional_to_velocity_and_saturate(figures)
     for curve, V in ((SLOW, 1e-6), (FAST, 1e-5)):
         assert late_over_early_slope(figure, curve, "mu1") < 0.1
         assert late_over_early_slope(figure, curve, "mu2") < 0.3
-        assert 0.95 * limit[V] < end(figure, curve, "mu1") < limit[V]
-        assert end(figure, curve, "mu2") < limit[V] / 2
+        assert 0.95 * limit[V] < figure.last(curve, "mu1") < limit[V]
+        assert figure.last(curve, "mu2") < limit[V] / 2
 
 
 def test_curves_on_common_axes_are_those_of_the_figures_of_each_law(figures):
