@@ -17,29 +17,28 @@ MACHINE = {"K": "0.2 N/um", "W0": "7 N"}
 STIFFNESS, FREQUENCY, FIRST, MEAN, DROP = 0.03, 0.1, 0.05, 1e-3, 2e-3
 
 
+def procedure(columns, bifurcations, name="bifurcations", **fixed):
+    thresholds = Thresholds(name, **bifurcations)
+    return paper_procedure(table_of(columns), thresholds, fixed=MACHINE | fixed)
+
+
 @pytest.fixture(scope="module")
 def exact():
     """Columns of a table without noise, and the exact bifurcations (Eqs. 16 and 17)."""
-    law = laws.ElastoPlastic(
-        **{n: TRUTH[n] for n in ("mu0", "A", "B", "D0")}, V0=1e-6, lambda_=TRUTH["lambda"]
-    )
+    numbers = {n: TRUTH[n] for n in ("mu0", "A", "B", "D0")} | {"V0": 1e-6}
     V, epsilon = np.repeat([1e-6, 1e-5], 4), np.tile([0.2, 0.3, 0.4, 0.5], 2)
-    response = periodic_response(
-        Slider(law, spring=2e5, load=7.0),
-        velocity=V,
-        epsilon=TRUTH["eps_ratio"] * epsilon,
-        frequency=120.0,
-    )
     # The drop is that of the Rice-Ruina law, which step 3 of the paper assumes.
-    rigid = periodic_response(
-        Slider(
-            laws.RiceRuina(**{n: TRUTH[n] for n in ("mu0", "A", "B", "D0")}, V0=1e-6),
-            spring=2e5,
-            load=7.0,
-        ),
-        velocity=V,
-        epsilon=TRUTH["eps_ratio"] * epsilon,
-        frequency=120.0,
+    response, rigid = (
+        periodic_response(
+            Slider(law, spring=2e5, load=7.0),
+            velocity=V,
+            epsilon=TRUTH["eps_ratio"] * epsilon,
+            frequency=120.0,
+        )
+        for law in (
+            laws.ElastoPlastic(**numbers, lambda_=TRUTH["lambda"]),
+            laws.RiceRuina(**numbers),
+        )
     )
     steady = np.geomspace(1e-7, 1e-4, 6)
     weakening = TRUTH["B"] - TRUTH["A"]
@@ -71,10 +70,7 @@ def exact():
 
 @pytest.fixture(scope="module")
 def recovered(exact):
-    columns, bifurcations = exact
-    return paper_procedure(
-        table_of(columns), Thresholds("bifurcations", **bifurcations), fixed=MACHINE
-    )
+    return procedure(*exact)
 
 
 def test_measurements_without_noise_give_the_true_values(recovered):
@@ -88,7 +84,7 @@ def test_a_bifurcation_that_occurs_twice_is_named(exact, recovered):
     twice = {n: np.append(c, c[0]) for n, c in bifurcations.items()}
     # Without the rows of the later steps, which are left out.
     steady = {n: c if np.ndim(c) == 0 else c[:6] for n, c in columns.items()}
-    found = paper_procedure(table_of(steady), Thresholds("ends", **twice), fixed=MACHINE)
+    found = procedure(steady, twice, "ends")
     assert "row 3 of ends is equal to row 1 of ends: remove it" in found.warnings[0]
     assert not any("is equal to" in warning for warning in recovered.warnings)
 
@@ -115,7 +111,7 @@ def test_errors_of_later_steps_include_those_of_the_earlier_ones(exact, recovere
         assert recovered.numbers[name].se > 1.02 * recovered.numbers[name].se_own
     # The critical frequency is shifted by one standard deviation.
     moved = bifurcations | {"frequency": bifurcations["frequency"] * (1 + FREQUENCY / np.sqrt(2))}
-    changed = paper_procedure(table_of(columns), Thresholds("moved", **moved), fixed=MACHINE)
+    changed = procedure(columns, moved, "moved")
     for name in names:
         number = recovered.numbers[name]
         shift = abs(changed.numbers[name].value - number.value)
@@ -127,9 +123,7 @@ def test_errors_of_later_steps_include_those_of_the_earlier_ones(exact, recovere
 
 
 def test_the_reference_velocity_changes_only_mu0(exact, recovered):
-    columns, bifurcations = exact
-    thresholds = Thresholds("bifurcations", **bifurcations)
-    moved = paper_procedure(table_of(columns), thresholds, fixed=MACHINE | {"V0": "10 um/s"})
+    moved = procedure(*exact, V0="10 um/s")
     weakening = TRUTH["B"] - TRUTH["A"]
     mu0 = moved.numbers["mu0"]
     assert mu0.value == pytest.approx(TRUTH["mu0"] - weakening * np.log(10), rel=1e-5)
@@ -178,9 +172,7 @@ def test_missing_measurements_are_refused(exact, change, message):
     columns, bifurcations = exact
     changed = {n: v for n, v in {**columns, **change}.items() if v is not None}
     with pytest.raises(InputError) as raised:
-        paper_procedure(
-            table_of(changed), Thresholds("bifurcations", **bifurcations), fixed=MACHINE
-        )
+        procedure(changed, bifurcations)
     assert message in str(raised.value)
 
 
@@ -194,9 +186,7 @@ def test_missing_measurements_are_refused(exact, change, message):
 def test_steps_without_rows_are_left_out(exact, absent, left, warning):
     columns, bifurcations = exact
     kept = {n: v for n, v in columns.items() if n.removesuffix("_err") not in absent}
-    result = paper_procedure(
-        table_of(kept), Thresholds("bifurcations", **bifurcations), fixed=MACHINE
-    )
+    result = procedure(kept, bifurcations)
     assert left <= set(result.numbers)
     assert "lambda" not in result.numbers
     assert any(warning in text for text in result.warnings)
@@ -215,9 +205,7 @@ def test_bifurcations_beyond_doubles_are_refused(exact, seed):
         for name, size in zip(names[: draw.integers(1, 6)], sizes, strict=False)
     }
     with pytest.raises(InputError, match="must have bifurcations from which A, B and D0 follow"):
-        paper_procedure(
-            table_of(columns), Thresholds("huge", **{**bifurcations, **huge}), fixed=MACHINE
-        )
+        procedure(columns, bifurcations | huge, "huge")
 
 
 HEADING = "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n"
