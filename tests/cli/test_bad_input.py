@@ -739,10 +739,3 @@ def test_more_processes_than_any_machine_runs(asperity, tmp_path, option) -> Non
     call = ("sweep", plan, "--out", tmp_path / "s.zarr", option)
     for count in ("1000000", "0"):
         refused(asperity(*call, count), f"{option} must be from 1 to")
-
-
-def test_an_unstable_response_is_said_to_be_left(asperity) -> None:
-    # Without modulation sliding is unstable below (B - A) W0/D0 = 0.23 N/um.
-    point = ("response", *SLIDING, "-f", "120 Hz", "-e", "0", "--set")
-    assert "the response is unstable" in asperity(*point, "K=0.22 N/um").stderr
-    assert not asperity(*point, "K=0.24 N/um").stderr

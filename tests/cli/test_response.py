@@ -71,6 +71,14 @@ def test_text_shows_numbers_with_units(asperity) -> None:
         assert part in shown.stdout
 
 
+def test_an_unstable_response_is_said_to_be_left(asperity) -> None:
+    # Without modulation sliding is unstable below (B - A) W0/(D0 + A lambda) = 0.222 N/um.
+    sliding = ("-e", "0", "--material", "bureau2000", "--set")
+    point = ("response", *POINT[:4], *POINT[6:], *sliding)
+    assert "the response is unstable" in asperity(*point, "K=0.22 N/um").stderr
+    assert not asperity(*point, "K=0.23 N/um").stderr
+
+
 def test_without_a_material_all_numbers_come_from_set(asperity) -> None:
     given = ("--law", "amontons", "--set", "mu0=0.4", "--set", "K=1 N/um", "--set", "W0=2 N")
     shown = asperity("response", *given, *POINT[2:], "--json")
