@@ -246,6 +246,17 @@ def test_the_dataset_has_units_events_and_provenance(physical) -> None:
     assert data.attrs["relative_tolerance"] == 1e-9
 
 
+@pytest.mark.parametrize(
+    ("name", "times"), [("rice-ruina", 1), ("ruina-slip", 1), ("perrin-rice-zheng", 2)]
+)
+def test_the_age_of_steady_sliding_is_that_of_the_law(name, times) -> None:
+    law = asp.laws.get_law(name)(mu0=0.6, A=0.012, B=0.01, D0="1 um", V0="3 um/s")
+    slider = asp.Slider(law, spring="1 N/um", load="7 N")
+    motion = transient(slider, Programme(Slide("0.1 s"), **START))
+    # dPhi/dt = 0 at v Phi = D0, and 2 D0 of Perrin, Rice and Zheng.
+    np.testing.assert_allclose(motion.age, times * 1.0, rtol=1e-9)
+
+
 def test_the_file_of_a_trajectory_is_read_as_a_recording(physical, tmp_path) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     steady = Programme(Slide("2 s"), load="7 N", velocity="3 um/s")

@@ -30,6 +30,10 @@ class PerrinRiceZheng(RiceRuina):
         r"\dot\Phi=1-\left(\frac{\dot x\Phi}{2D_0}\right)^2",
     )
 
+    def age(self, state: State, w: ArrayLike) -> Array:
+        """Phi (s), over 2 D0/V0 in the state."""
+        return 2 * super().age(state, w)
+
     def ageing(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Rate d ln(Phi)/dt = 1/Phi - (v / (2 D0))^2 Phi (1/s)."""
         growth = self.V0 * jnp.exp(-self.log_age(state, w))  # 2 D0 / Phi

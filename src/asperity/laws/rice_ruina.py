@@ -68,6 +68,10 @@ class RiceRuina(Law):
         """ln(V0 Phi / D0): here the state variable itself."""
         return state[0]
 
+    def age(self, state: State, w: ArrayLike) -> Array:
+        """Phi (s)."""
+        return self.D0 / self.V0 * jnp.exp(self.log_age(state, w))
+
     def ageing(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Rate d ln(Phi)/dt = 1/Phi - v/D0 (1/s); `v` is what renews the contacts."""
         return (self.V0 * jnp.exp(-self.log_age(state, w)) - v) / self.D0

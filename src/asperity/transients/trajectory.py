@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from asperity.arrays import Float
@@ -158,7 +157,7 @@ def row_bytes(law_states: int) -> int:
     return 8 * (7 + 3 + law_states)
 
 
-_age = jax.jit(lambda law, state, w: law.D0 / law.V0 * jnp.exp(law.log_age(state, w)))
+_age = jax.jit(lambda law, state, w: law.age(state, w))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
