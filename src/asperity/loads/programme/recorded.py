@@ -160,8 +160,9 @@ def interpolated(
     require(values.shape == time.shape, field, rule, got, "give one sample for each time")
     pieces = _pieces(interpolant, name)(time - time[0], values)
     # Splines overshoot, so the bounds include extrema between samples.
-    between = pieces(np.concatenate([pieces.x, 0.5 * (pieces.x[1:] + pieces.x[:-1])]))
-    return PiecewiseCubic.of(pieces.x, pieces.c), np.append(between, values[-1])
+    extrema = pieces.derivative().roots(extrapolate=False)
+    bounds = pieces(extrema[np.isfinite(extrema)])
+    return PiecewiseCubic.of(pieces.x, pieces.c), np.concatenate([bounds, values])
 
 
 def _pieces(interpolant: str, name: str) -> Any:
