@@ -336,6 +336,7 @@ def test_one_harmonic_is_the_harmonic_load():
         (lambda: modulated(0.1, tilt="95 deg"), "tilt must be less than a right angle"),
         (lambda: modulated(0.1, tilt="5 turns"), "tilt must be an angle in rad or deg"),
         (lambda: sampled(), "load, velocity or shear must be given"),
+        (lambda: sampled(shear=[0.2, 0.3, 0.1]), "shear must have a mean of zero, got 0.2"),
         (lambda: sampled([1.0, np.nan, 1.0]), "load must be finite, got nan"),
         (lambda: sampled(velocity=[-1.0, -2.0, -1.0]), "velocity must have a positive mean"),
     ],

@@ -3,15 +3,19 @@
 import subprocess
 import sys
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.scipy.special import i0
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from asperity.errors import InputError
 from asperity.loads import (
     CyclicLoading,
+    Excitation,
     Follow,
+    Harmonic,
     Hold,
     Modulate,
     Periodic,
@@ -78,6 +82,14 @@ def test_modulation_rises_and_falls_with_its_phase() -> None:
 PERIODIC = Periodic(load=((0.2, 0.0), (0.0, 0.1)), shear=((0.05, 0.0),), pull=((0.1, 0.3),))
 
 
+class DrivenByAClass(Harmonic):
+    """A modulation of a user's class, whose pulling velocity is no attribute."""
+
+    def at(self, theta: object) -> Excitation:
+        pull = jnp.exp(0.5 * jnp.cos(theta)) / i0(0.5)
+        return super().at(theta)._replace(pull=pull)
+
+
 @pytest.mark.parametrize(
     "step",
     [
@@ -85,11 +97,12 @@ PERIODIC = Periodic(load=((0.2, 0.0), (0.0, 0.1)), shear=((0.05, 0.0),), pull=((
         RampVelocity("5 um/s", "0.4 s"),
         Modulate("0.4 s", 0.2, "7 Hz", rise="0.4 s", phase=0.4, epsilon_v=0.3, shear_ratio=0.2),
         CyclicLoading("0.4 s", PERIODIC, "7 Hz"),
+        CyclicLoading("0.4 s", DrivenByAClass(0.2), "7 Hz"),
         Follow(
             np.linspace(0, 0.4, 9), 7 + np.sin(np.arange(9)), 1e-6 + 1e-7 * np.cos(np.arange(9))
         ),
     ],
-    ids=lambda step: type(step).__name__,
+    ids=["load ramp", "velocity ramp", "harmonic", "periodic", "class", "recorded"],
 )
 def test_slopes_and_positions_are_derivatives_and_integrals_of_the_values(step) -> None:
     (segment,) = Programme(step, **START).segments
@@ -122,6 +135,15 @@ def test_a_recording_is_one_interpolant(name, peer) -> None:
     end = 0.5 + t[-1] - t[0]
     whole = 0.5e-6 + peer(t, V).integrate(t[0], t[-1])
     assert p.position(end) == pytest.approx(whole, rel=1e-12)
+
+
+def test_the_lowest_load_of_a_spline_is_that_between_its_samples() -> None:
+    # Contact is lost near t = 2.44 s; at all samples, and halfway between, the load is positive.
+    time, load = np.arange(6.0), np.array([7.44, 5.44, 0.54, 0.49, 2.44, 7.44])
+    (segment,) = Programme(Follow(time, load, interpolant="spline"), **START).segments
+    values = segment.load(np.linspace(0, 5, 100_001))[0]
+    assert segment.lowest_load == pytest.approx(float(np.min(values)), abs=1e-6)
+    assert segment.lowest_load < 0
 
 
 @pytest.mark.parametrize(

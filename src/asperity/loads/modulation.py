@@ -126,9 +126,9 @@ class Periodic(Modulation):
 
     def at(self, theta: ArrayLike) -> Excitation:
         """Values and slopes at the phase `theta` (rad)."""
-        w, w_slope = _sum(self.load, theta)
-        shear, shear_slope = _sum(self.shear, theta)
-        pull, _ = _sum(self.pull, theta)
+        w, w_slope = fourier_sum(self.load, theta)
+        shear, shear_slope = fourier_sum(self.shear, theta)
+        pull, _ = fourier_sum(self.pull, theta)
         return Excitation(1 + w, w_slope, shear, shear_slope, 1 + pull)
 
     @property
@@ -152,8 +152,8 @@ class Periodic(Modulation):
 
 
 @jax.jit
-def _sum(series: Series, theta: ArrayLike) -> tuple[Array, Array]:
-    """Value and slope of a series."""
+def fourier_sum(series: Series, theta: ArrayLike) -> tuple[Array, Array]:
+    """Sum of the terms of a series at the phases `theta` (rad), and its slope."""
     parts = [part for pair in series for part in pair]
     none = jnp.zeros(jnp.broadcast_shapes(jnp.shape(theta), *map(jnp.shape, parts)))
     if not series:
@@ -191,6 +191,9 @@ _UNROLLED = 8
 
 #: Fourier coefficients of a sampled period below this share of the largest are left out.
 _NEGLIGIBLE = 1e-13
+
+#: Largest mean of a shear force, over its largest sample.
+_MEAN = 1e-6
 
 
 @typed
@@ -294,7 +297,8 @@ def sampled(
     Raises
     ------
     InputError
-        If samples are missing or not finite, a mean is not positive, or the load vanishes.
+        If samples are missing or not finite, the mean of load or velocity is not positive, that of
+        the shear force is not zero, or the load vanishes.
     """
     given = {"load": load, "velocity": velocity, "shear": shear}
     if all(values is None for values in given.values()):
@@ -335,11 +339,14 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
     rule, got = "be at least 3 finite samples of one period", f"an array of shape {samples.shape}"
     require(holds, name, rule, got, "give evenly spaced samples without the end point")
     spectrum = np.fft.rfft(samples) / len(samples)
-    scale = 1.0
-    if name != "shear":
-        scale = spectrum[0].real
-        rule = "have a positive mean"
-        require(scale > 0, name, rule, f"{scale:g}", "give it in the sense of sliding")
+    mean = scale = spectrum[0].real
+    if name == "shear":
+        scale, rule = 1.0, "have a mean of zero"
+        advice = "subtract it: a constant force only shifts that of the spring"
+        require(abs(mean) <= _MEAN * np.abs(samples).max(), name, rule, f"{mean:g}", advice)
+    else:
+        rule, advice = "have a positive mean", "give it in the sense of sliding"
+        require(mean > 0, name, rule, f"{mean:g}", advice)
     # At half the number of samples, cos and sin cannot be distinguished.
     top = (len(samples) - 1) // 2
     kept = spectrum[1 : min(top, harmonics or top) + 1] / scale

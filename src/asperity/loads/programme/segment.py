@@ -20,7 +20,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import configure
-from asperity.loads.modulation import Excitation, Modulation
+from asperity.loads.modulation import Excitation, Modulation, Series, fourier_sum
 
 configure()  # double precision, before any segment makes an array
 
@@ -256,6 +256,8 @@ class PeriodicSegment(ProgrammeSegment):
         Hz.
     load1, pull1 : array
         Mean load (N) and mean pulling velocity (m/s).
+    pull_series : Series
+        Fourier coefficients of the pulling velocity of the modulation.
     """
 
     duration: Scalar = eqx.field(converter=jnp.asarray)
@@ -263,6 +265,7 @@ class PeriodicSegment(ProgrammeSegment):
     frequency: Scalar = eqx.field(converter=jnp.asarray)
     load1: Scalar = eqx.field(converter=jnp.asarray)
     pull1: Scalar = eqx.field(converter=jnp.asarray)
+    pull_series: Series
 
     @property
     def _omega(self) -> Array:
@@ -281,12 +284,9 @@ class PeriodicSegment(ProgrammeSegment):
 
     def position(self, t: ArrayLike) -> Array:
         """Integral of V, term by term."""
-        displacement = self.pull1 * jnp.asarray(t)
-        for k, (a, b) in enumerate(getattr(self.modulation, "pull", ()), start=1):
-            angle = k * self._omega * t
-            swing = a * jnp.sin(angle) + b * (1 - jnp.cos(angle))
-            displacement = displacement + self.pull1 * swing / (k * self._omega)
-        return displacement
+        integral = tuple((-b / k, a / k) for k, (a, b) in enumerate(self.pull_series, start=1))
+        swing = fourier_sum(integral, self._omega * t)[0] - fourier_sum(integral, 0.0)[0]
+        return self.pull1 * (jnp.asarray(t) + swing / self._omega)
 
     def _over_a_period(self) -> np.ndarray:
         return np.linspace(0, 1 / float(self.frequency), 513)

@@ -11,11 +11,14 @@ from numpy.typing import ArrayLike
 
 from asperity.errors import require
 from asperity.loads.consistency import checked_modulation
-from asperity.loads.modulation import Modulation
+from asperity.loads.modulation import Modulation, Periodic, Series, sampled
 from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import HarmonicSegment, PeriodicSegment, ProgrammeSegment
 from asperity.parameters.arguments import number, typed
 from asperity.units import to_radians, to_si
+
+#: Samples of the pulling velocity over a period of a user's modulation.
+_SAMPLES = 1024
 
 #: A number in SI, or a text with its unit.
 Given: TypeAlias = float | str
@@ -212,7 +215,17 @@ class CyclicLoading(ProgrammeStep):
         frequency = number(self.frequency, f"{name}.frequency", "frequency", "positive")
         duration = _duration(self.duration, name)
         modulation = checked_modulation(self.modulation, f"{name}.modulation")
-        return [PeriodicSegment(duration, modulation, frequency, level.load, level.velocity)], level
+        pull = _pull_series(modulation)
+        segment = PeriodicSegment(duration, modulation, frequency, *level, pull)
+        return [segment], level
+
+
+def _pull_series(modulation: Modulation) -> Series:
+    """Fourier coefficients of a modulation's pulling velocity: its own, or those of its samples."""
+    if isinstance(modulation, Periodic):
+        return modulation.pull
+    theta = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    return sampled(velocity=np.asarray(modulation.at(theta).pull) * np.ones(_SAMPLES)).pull
 
 
 @dataclass(frozen=True, eq=False)
