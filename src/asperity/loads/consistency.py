@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError, code_of_others
+from asperity.errors import InputError, code_of_others, require
 from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
 from asperity.parameters.arguments import broadcast_shape, shown
 
@@ -53,30 +53,28 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
     rule = "have members that work on arrays of jax.numpy"
     page, where = "see the page 'Write your own load'", type(modulation).__name__
     with code_of_others(name, rule, page, where):
-        fault = _first_fault(structure, flat, int(np.prod(shape)), name)
-    if fault:
-        raise InputError(fault)
+        _check(structure, flat, int(np.prod(shape)), name)
     return modulation
 
 
-def _first_fault(
+def _check(
     structure: Any, leaves: list[Float], points: int, name: str, samples: int = _SAMPLES[0]
-) -> str:
-    """A fault that remains with more samples; empty without a fault."""
+) -> None:
+    """Raise `InputError` for a fault that remains with more samples."""
     at_once = _VALUES // samples
     for first in range(0, points, at_once):
         part = [leaf[first : first + at_once] for leaf in leaves]
-        fault = _fault(structure.unflatten(part), samples, name)
-        if fault and samples < _SAMPLES[-1]:
+        try:
+            _check_samples(structure.unflatten(part), samples, name)
+        except InputError:
+            if samples == _SAMPLES[-1]:
+                raise
             finer = _SAMPLES[_SAMPLES.index(samples) + 1]
-            fault = _first_fault(structure, part, min(at_once, points - first), name, finer)
-        if fault:
-            return fault
-    return ""
+            _check(structure, part, min(at_once, points - first), name, finer)
 
 
-def _fault(modulation: Modulation, samples: int, name: str) -> str:
-    """The fault of the first faulty point; empty without a fault."""
+def _check_samples(modulation: Modulation, samples: int, name: str) -> None:
+    """Raise `InputError` for the first faulty point."""
     theta = 2 * np.pi * np.arange(samples) / samples
     at = modulation.at(theta[:, None])
     amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))
@@ -84,45 +82,33 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
         field: np.asarray(value, float) * np.ones((samples, amplitude.size))
         for field, value in zip(Excitation._fields, at, strict=True)
     }
+    member = f"{name}.at"
     for field, part in values.items():
-        if not np.isfinite(part).all():
-            return f"{name}.at must be finite over the period, got {field} that is not; correct it"
+        rule, got = "be finite over the period", f"{field} that is not"
+        require(np.isfinite(part).all(), member, rule, got, "correct it")
     w, pull = values["w"], values["pull"]
-    if (low := w.min()) <= 0:
-        return (
-            f"{name} must keep W/W0 positive over the period, so that contact is never lost, got "
-            f"{low:.4g}; lower its strength"
-        )
+    rule = "keep W/W0 positive over the period, so that contact is never lost"
+    require(w.min() > 0, name, rule, f"{w.min():.4g}", "lower its strength")
     for field, part in (("w", w), ("pull", pull)):
         means = part.mean(0)
         mean = float(means[np.argmax(np.abs(means - 1.0))])
-        if abs(mean - 1) > _MEAN:
-            return (
-                f"{name}.at must give a {field} of mean 1 over the period, got {mean:.6g}; divide "
-                "it by its mean"
-            )
+        rule = f"give a {field} of mean 1 over the period"
+        require(abs(mean - 1) <= _MEAN, member, rule, f"{mean:.6g}", "divide it by its mean")
     for field in ("w", "shear"):
         missed = _missed_by_slope(values[field], values[f"{field}_slope"])
-        if missed > _SLOPE:
-            return (
-                f"{name}.at must give {field}_slope as the derivative of {field} with respect to "
-                f"theta, got one that misses {100 * missed:.2g} % of its variation; differentiate "
-                f"{field} once more"
-            )
+        rule = f"give {field}_slope as the derivative of {field} with respect to theta"
+        got = f"one that misses {100 * missed:.2g} % of its variation"
+        require(missed <= _SLOPE, member, rule, got, f"differentiate {field} once more")
     first = 2 * np.abs((w * np.exp(-1j * theta)[:, None]).mean(0))
     wrong = np.argmax(np.abs(amplitude - first))
-    if abs(amplitude[wrong] - first[wrong]) > _MEAN:
-        return (
-            f"{name}.amplitude must be that of the first harmonic of W/W0, {first[wrong]:.6g}, got "
-            f"{amplitude[wrong]:.6g}; correct one of the two"
-        )
+    rule = f"be that of the first harmonic of W/W0, {first[wrong]:.6g}"
+    got, advice = f"{amplitude[wrong]:.6g}", "correct one of the two"
+    holds = abs(amplitude[wrong] - first[wrong]) <= _MEAN
+    require(holds, f"{name}.amplitude", rule, got, advice)
     still = np.asarray(modulation.scaled(0.0).at(theta[:, None]).w)
-    if not np.abs(still - 1).max() <= _MEAN:
-        return (
-            f"{name}.scaled(0) must be a constant load, W/W0 = 1, got one that changes; multiply "
-            "the strength by the share"
-        )
-    return ""
+    rule, got = "be a constant load, W/W0 = 1", "one that changes"
+    holds, advice = np.abs(still - 1).max() <= _MEAN, "multiply the strength by the share"
+    require(holds, f"{name}.scaled(0)", rule, got, advice)
 
 
 def _missed_by_slope(values: Float, slopes: Float) -> float:
