@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ import numpy as np
 from jax import Array
 
 from asperity.errors import InputError, code_of_others, require
-from asperity.laws.law import Law
+from asperity.laws.law import Law, State
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import shown
 
@@ -85,7 +85,7 @@ def checked_law(law: Law) -> Law:
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         return law
     one = jax.tree.map(lambda a: jnp.asarray(np.ravel(np.asarray(a, float))[0]), law)
-    _check_numbers(kind, _probe(kind)(one))
+    _check_numbers(kind, *_probe(kind)(one))
     return law
 
 
@@ -126,47 +126,42 @@ def _require_shape(result: Any, shape: tuple[int, ...], name: str, kind: type[La
     require(real, name, rule, f"{got} for {shape} from '{kind.name}'", _PAGE)
 
 
-@cache
-def _probe(kind: type[Law]) -> Callable[[Law], dict[str, Array]]:
-    """A compiled program that evaluates all methods of a law at the test velocities."""
+#: Friction in steady sliding and at a higher velocity, and the rates of the states in steady
+#: sliding and at twice the velocity.
+_Values: TypeAlias = tuple[Array, Array, Array, Array]
 
-    def probe(law: Law) -> dict[str, Array]:
+
+@cache
+def _probe(kind: type[Law]) -> Callable[[Law], tuple[_Values, _Values]]:
+    """A compiled program: a law at all test velocities together, and at each alone."""
+
+    def values(law: Law, v: Array, steady: State, one: Array) -> _Values:
+        def rates(u: Array) -> Array:
+            return jnp.stack([*law.state_rate(u, u, steady, one), one * 0])
+
+        friction = law.friction(v, steady, one), law.friction(1.01 * v, steady, one)
+        return *friction, rates(v), rates(2 * v)
+
+    def probe(law: Law) -> tuple[_Values, _Values]:
         v, one = jnp.array(_SPEEDS), jnp.ones(len(_SPEEDS))
-        steady = law.steady_state(v)
-        friction = law.friction(v, steady, one)
-        rates = jnp.stack([*law.state_rate(v, v, steady, one), one * 0])
-        faster = jnp.stack([*law.state_rate(2 * v, 2 * v, steady, one), one * 0])
-        alone = jax.vmap(lambda *each: law.friction(each[0], each[1], each[2]))(v, steady, one)
-        rate_alone = jax.vmap(lambda u, s, w: jnp.stack([*law.state_rate(u, u, s, w), w * 0]))(
-            2 * v, steady, one
-        )
-        return {
-            "friction": friction,
-            "faster": law.friction(1.01 * v, steady, one),
-            "alone": alone,
-            "rates": rates,
-            "faster_rates": faster,
-            "rates_alone": rate_alone.T,
-        }
+        at = (law, v, law.steady_state(v), one)
+        return values(*at), jax.vmap(values, in_axes=(None, 0, 0, 0), out_axes=-1)(*at)
 
     return jax.jit(probe)
 
 
-def _check_numbers(kind: type[Law], result: dict[str, Array]) -> None:
+def _check_numbers(kind: type[Law], together: _Values, alone: _Values) -> None:
     """Raise `InputError` for a fault in the numbers of a law."""
-    at = {name: np.asarray(values) for name, values in result.items()}
     both, name = "law.friction and law.state_rate", f"'{kind.name}'"
-    finite = np.isfinite(at["friction"]) & np.isfinite(at["rates"]).all(0)
+    finite = np.isfinite(np.vstack([together[0], together[2]])).all(0)
     got = f"no finite number from 1e-8 to 1e-3 m/s of {name} with these parameters"
     require(finite.any(), both, "be finite in steady sliding", got, _PAGE)
-    friction, faster, quicker, alone, rates, rates_alone = (
-        at[n][..., finite]
-        for n in ("friction", "faster_rates", "faster", "alone", "rates", "rates_alone")
-    )
-    same = np.allclose(friction, alone, rtol=1e-9, atol=1e-12)
-    same = same and np.allclose(faster, rates_alone, rtol=1e-9, equal_nan=True)
+    whole, single = ([np.asarray(a)[..., finite] for a in part] for part in (together, alone))
+    # The rates in steady sliding are rounding errors.
+    same = all(np.allclose(whole[i], single[i], rtol=1e-9, equal_nan=True) for i in (0, 1, 3))
     got = f"{name}, whose elements influence each other"
     require(same, both, "act on each element for itself", got, _PAGE)
+    friction, quicker, rates, faster = whole
     rest, moving = np.abs(rates), np.abs(faster)
     if np.any(rest > _STEADY * np.where(np.isfinite(moving), moving, np.inf)):
         row, column = np.argwhere(~(rest <= _STEADY * moving))[0]
