@@ -172,6 +172,8 @@ def test_a_stream_refuses_bad_input_and_a_wrong_frequency(truth) -> None:
         stream.add(time + 1, load, force)
     with pytest.raises(InputError, match=r"LockInStream\.add must be finite"):
         stream.add(time, load, np.where(time == time[100], np.nan, force))
+    with pytest.raises(InputError, match=r"LockInStream\.add must have one length"):
+        stream.add(time[:-1], load, force)
     with pytest.raises(InputError, match="end must follow start"):
         LockInStream(60.0, start=1.0, end=0.0)
     with pytest.raises(InputError, match="detrend must be"):

@@ -17,7 +17,6 @@ _OPTIONS: Mapping[str, str] = {
     "measure.steps and holds": "--steps and --holds",
     "measure.events": "--events",
     "modulated": "--no-modulation",
-    "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",
     "lock_in.load and force": "the load and the force",

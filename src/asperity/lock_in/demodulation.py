@@ -15,6 +15,9 @@ A `LockInStream` reads recordings that do not fit into memory, or are not finish
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Annotated, Literal, TypeAlias
+
 import numpy as np
 
 from asperity.arrays import Complex, Float
@@ -43,7 +46,7 @@ from asperity.lock_in.reference import (
     window_basis,
 )
 from asperity.lock_in.settling import Settling, find_settlings, without
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, typed
 
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
@@ -53,7 +56,9 @@ _FIRST_SHARE = 0.125
 #: first-order correction: up to `_SHORT_STEP`, and with more than `_LONG` samples, where another
 #: pass takes longer, up to `CONVERGED`.
 _SHORT_STEP, _LONG = 1e-8, 1 << 17
-DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
+#: Drift that is fitted together with the harmonics, and its degree.
+Detrend: TypeAlias = Literal["none", "linear", "quadratic"]
+DRIFTS: Mapping[Detrend, int] = {"none": 0, "linear": 1, "quadratic": 2}
 
 #: Largest error of the frequency, as phase (rad) at the ends of the window. It is corrected to
 #: first order; the remaining relative error is about a hundredth.
@@ -67,8 +72,8 @@ def lock_in(
     force: Float,
     *,
     frequency: float | None = None,
-    harmonics: int = 4,
-    detrend: str = "linear",
+    harmonics: Annotated[int, at_least(1)] = 4,
+    detrend: Detrend = "linear",
     refine: bool = True,
     settles: bool = False,
 ) -> LockInReading:
@@ -99,7 +104,7 @@ def lock_in(
     InputError
         If there are too few samples, the clock does not rise, or the frequency is not resolved.
     """
-    degree = _degree(detrend, "lock_in.detrend")
+    degree = DRIFTS[detrend]
     _check(time, load, force, harmonics, degree)
     if frequency is None and not refine:
         raise InputError("lock_in.frequency", "be given with refine=False", "None", "give it in Hz")
@@ -203,17 +208,13 @@ def _white(blocks: BlockSums, residual: Complex) -> Float:
     return total.T @ total / max(float(blocks.count.sum()) - blocks.basis.linear - 1, 1.0)
 
 
-def _degree(detrend: str, field: str) -> int:
-    rule = "be none, linear or quadratic"
-    require(detrend in DRIFTS, field, rule, f"'{detrend}'", "choose one")
-    return DRIFTS[detrend]
+def _check_lengths(time: Float, load: Float, force: Float, field: str) -> None:
+    rule, got = "have one length", f"{time.size}, {load.size} and {force.size}"
+    require(time.size == load.size == force.size, field, rule, got, "cut them to the same samples")
 
 
 def _check(time: Float, load: Float, force: Float, harmonics: int, degree: int) -> None:
-    require(not harmonics < 1, "lock_in.harmonics", "be at least 1", harmonics, "ask for 1 or more")
-    rule, got = "have one length", f"{time.size}, {load.size} and {force.size}"
-    advice = "cut them to the same samples"
-    require(time.size == load.size == force.size, "lock_in.time, load and force", rule, got, advice)
+    _check_lengths(time, load, force, "lock_in.time, load and force")
     least = 2 * (degree + 1 + 2 * harmonics) + 2
     holds, rule = not time.size < least, f"hold at least {least} samples for {harmonics} harmonics"
     require(holds, "lock_in.time", rule, time.size, "give a longer window or fewer harmonics")
@@ -257,7 +258,8 @@ class LockInStream:
     Raises
     ------
     InputError
-        If `detrend` is not known, or the window or the frequency is not positive.
+        If `harmonics` or `detrend` break their rule, or the window or the frequency is not
+        positive.
     """
 
     def __init__(
@@ -266,15 +268,15 @@ class LockInStream:
         *,
         start: float,
         end: float,
-        harmonics: int = 4,
-        detrend: str = "linear",
+        harmonics: Annotated[int, at_least(1)] = 4,
+        detrend: Detrend = "linear",
     ) -> None:
-        degree = _degree(detrend, "LockInStream.detrend")
         rule, advice = "follow start and frequency be positive", "give them in this order"
         got = f"{start:g} s, {end:g} s and {frequency:g} Hz"
         require(end > start and frequency > 0, "LockInStream.end", rule, got, advice)
         half = (end - start) / 2
-        self._basis = Basis(2 * np.pi * frequency, harmonics, degree, start + half, half)
+        omega, degree = 2 * np.pi * frequency, DRIFTS[detrend]
+        self._basis = Basis(omega, harmonics, degree, start + half, half)
         self._parts: list[BlockSums] = []
 
     def add(self, time: Float, load: Float, force: Float) -> None:
@@ -283,8 +285,9 @@ class LockInStream:
         Raises
         ------
         InputError
-            If they lie outside the window or are not finite.
+            If they have different lengths, lie outside the window or are not finite.
         """
+        _check_lengths(time, load, force, "LockInStream.add")
         basis = self._basis
         first, last = basis.centre - basis.half_width, basis.centre + basis.half_width
         slack = 1e-9 * basis.half_width

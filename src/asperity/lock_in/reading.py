@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from asperity.arrays import Complex, Float
-from asperity.errors import InputError, closest, require
+from asperity.errors import require, require_known
 from asperity.lock_in.noise import LocalNoise
 from asperity.lock_in.normal_equations import BlockSums, inverted
 from asperity.lock_in.settling import Settling
@@ -196,15 +197,11 @@ class LockInReading:
         InputError
             For any other name.
         """
-        for kind in ("mu", "phase"):
-            if name.startswith(kind) and name[len(kind) :].isdigit():
-                phasor = self.phasor(int(name[len(kind) :]))
-                if kind == "mu":
-                    return phasor.amplitude_uncertainty
-                return phasor.phase_uncertainty
-        if name not in self.names:
-            advice = closest(name, self.names)
-            raise InputError("LockInReading.uncertainty", "name a number", f"'{name}'", advice)
+        polar = re.fullmatch(r"(mu|phase)(\d+)", name)
+        if polar:
+            phasor = self.phasor(int(polar[2]))
+            return phasor.amplitude_uncertainty if polar[1] == "mu" else phasor.phase_uncertainty
+        require_known(name, self.names, "LockInReading.uncertainty", "name a number")
         at = self.names.index(name)
         return math.sqrt(max(float(self.covariance[at, at]), 0.0))
 

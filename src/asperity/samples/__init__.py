@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
-from asperity.errors import InputError, closest
+from asperity.errors import require_known
 from asperity.parameters.arguments import at_least, typed
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ def path(name: str) -> Path:
     InputError
         If there is no sample of this name.
     """
-    if name not in names():
-        raise InputError("name", "be a sample", f"'{name}'", closest(name, names()))
+    require_known(name, names(), "name", "be a sample")
     return _FOLDER / f"{name}.toml"
 
 

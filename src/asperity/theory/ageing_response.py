@@ -24,15 +24,13 @@ none: <p> = 1 and <e^(-phi)> = 1 hold exactly, so
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.parameters.arguments import one_of, typed
-from asperity.theory.closed_forms import SmallModulation
-
-AgeVelocity: TypeAlias = Literal["slider", "plastic"]
+from asperity.parameters.arguments import typed
+from asperity.theory.closed_forms import AgeVelocity, SmallModulation
 
 
 class AgeingResponse(NamedTuple):
@@ -87,8 +85,7 @@ def ageing_response(p: SmallModulation, age_velocity: AgeVelocity = "slider") ->
     InputError
         If `age_velocity` is neither of the two.
     """
-    known = ("slider", "plastic")
-    plastic = one_of(age_velocity, known, "ageing_response.age_velocity") == "plastic"
+    plastic = age_velocity == "plastic"
     one, two = _order(p, 1, plastic), _order(p, 2, plastic)
     nu = p.V / (p.omega * p.D0)
 

@@ -25,9 +25,11 @@ from jax.typing import ArrayLike
 
 from asperity.errors import InputError
 from asperity.laws.parameter import checked
-from asperity.parameters.arguments import one_of, typed
+from asperity.parameters.arguments import typed
 
 Form: TypeAlias = Literal["derived", "as_printed"]
+#: Velocity that renews the contacts: the slider's, as printed in Eq. (2), or the plastic one.
+AgeVelocity: TypeAlias = Literal["slider", "plastic"]
 
 #: Laws whose steady sliding loses stability at a stiffness known in closed form: of rigid
 #: asperities, and of elastic ones with the velocity of their age law.
@@ -92,7 +94,7 @@ def steady_position(p: SmallModulation, t: ArrayLike, form: Form = "derived") ->
 
     The spring carries F = mu W0, so that x_st = V t - mu W0 / K; the printed form lacks mu.
     """
-    mu = 1.0 if _as_printed(form) else p.mu
+    mu = 1.0 if form == "as_printed" else p.mu
     return p.V * t - mu * p.W0 / p.K
 
 
@@ -103,7 +105,7 @@ def determinant(p: SmallModulation, form: Form = "derived") -> Array:
     Derived: (K - M omega^2 + i omega A W0/V)(V/D0 + i omega) - i omega B W0/D0. The printed form
     has K/Kc where factoring this out gives Kc/K, and, like omega_c, needs B > A.
     """
-    if not _as_printed(form):
+    if form == "derived":
         mechanical = p.K - p.M * p.omega**2 + 1j * p.omega * p.A * p.W0 / p.V
         return mechanical * (p.V / p.D0 + 1j * p.omega) - 1j * p.omega * p.B * p.W0 / p.D0
     ratio = p.K / critical_stiffness(p)
@@ -173,7 +175,7 @@ def second_harmonic(p: SmallModulation, epsilon: ArrayLike, form: Form = "derive
 
     Derived: (V K/(omega W0)) mu (mu + 2A)/(8 A^2) eps^2; printed: with mu^2/(2 A^2) in its place.
     """
-    factor = p.mu**2 / 2 if _as_printed(form) else p.mu * (p.mu + 2 * p.A) / 8
+    factor = p.mu**2 / 2 if form == "as_printed" else p.mu * (p.mu + 2 * p.A) / 8
     return p.kappa * factor / p.A**2 * jnp.square(epsilon)
 
 
@@ -210,7 +212,7 @@ def age_to_velocity_ratio(p: SmallModulation, form: Form = "derived") -> Array:
     Derived: 1/sqrt(1 + (omega D0/V)^2), from Eq. (14) alone. Printed: omega_c/omega, which is its
     high-frequency limit only where (B - A)/A = 1, as it is at the paper's central values.
     """
-    if not _as_printed(form):
+    if form == "derived":
         return 1 / jnp.hypot(1.0, p.omega * p.D0 / p.V)
     return critical_pulsation(p) / p.omega
 
@@ -245,7 +247,7 @@ def critical_stiffness_inertial(p: SmallModulation) -> Array:
 
 
 @typed
-def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider") -> Array:
+def critical_stiffness_elastic(p: SmallModulation, age_velocity: AgeVelocity = "slider") -> Array:
     """Kc (N/m) of elastic asperities without inertia (not in the paper).
 
     Parameters
@@ -256,8 +258,8 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
         "plastic": (B - A) W0/(D0 - (B - A) lambda), the spring and the asperities in series;
         infinite where the asperities alone are too soft, lambda >= D0/(B - A).
     """
-    lengths = {"slider": p.D0 + p.A * p.lambda_, "plastic": p.D0 - (p.B - p.A) * p.lambda_}
-    length = lengths[one_of(age_velocity, lengths, "critical_stiffness_elastic.age_velocity")]
+    plastic = age_velocity == "plastic"
+    length = p.D0 + (p.A - p.B if plastic else p.A) * p.lambda_
     stabilised = length > 0
     return jnp.where(stabilised, (p.B - p.A) * p.W0 / jnp.where(stabilised, length, 1.0), jnp.inf)
 
@@ -282,7 +284,3 @@ def critical_stiffness_form(
     if law in _ELASTIC and not inertia:
         return partial(critical_stiffness_elastic, age_velocity=_ELASTIC[law])
     return None
-
-
-def _as_printed(form: str) -> bool:
-    return one_of(form, ("derived", "as_printed"), "closed form") == "as_printed"
