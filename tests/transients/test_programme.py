@@ -25,6 +25,7 @@ from asperity.loads import (
     Slide,
     StepLoad,
 )
+from asperity.loads.programme.segment import load_of, pull_of
 from asperity.transients import transient
 
 START = {"load": "7 N", "velocity": "1 um/s"}
@@ -112,11 +113,13 @@ def test_slopes_and_positions_are_derivatives_and_integrals_of_the_values(step) 
         for name in ("w", "shear"):
             slope = (float(getattr(after, name)) - float(getattr(before, name))) / (2 * h)
             assert float(getattr(here, f"{name}_slope")) == pytest.approx(slope, rel=1e-7, abs=1e-7)
-        way = quad(lambda x: float(segment.pull(x)), 0, t, points=np.linspace(0, 0.4, 9)[1:-1])[0]
+        way = quad(lambda x: float(pull_of(segment, x)), 0, t, points=np.linspace(0, 0.4, 9)[1:-1])[
+            0
+        ]
         assert float(segment.position(t)) == pytest.approx(way, rel=1e-9)
     t = np.linspace(0, 0.4, 400)
-    assert segment.lowest_load <= np.min(segment.load(t)[0]) + 1e-3
-    assert segment.fastest_pull >= np.max(np.abs(segment.pull(t))) * (1 - 1e-3)
+    assert segment.lowest_load <= np.min(load_of(segment, t)) + 1e-3
+    assert segment.fastest_pull >= np.max(np.abs(pull_of(segment, t))) * (1 - 1e-3)
 
 
 @pytest.mark.parametrize(("name", "peer"), [("pchip", PchipInterpolator), ("spline", CubicSpline)])
@@ -127,7 +130,7 @@ def test_a_recording_is_one_interpolant(name, peer) -> None:
     p = Programme(Slide("0.5 s"), Follow(t, W, V, interpolant=name), Slide("0.1 s"), **START)
     x = np.linspace(t[0], t[-1], 1000)[:-1]
     (segment,) = [s for s in p.segments if type(s).__name__ == "RecordedSegment"]
-    value, rate = segment.load(x - t[0])
+    value, rate = segment.at(x - t[0], 1.0, 1.0)[:2]
     np.testing.assert_allclose(value, peer(t, W)(x), rtol=1e-11)
     np.testing.assert_allclose(rate, peer(t, W)(x, 1), rtol=1e-9, atol=1e-7)
     np.testing.assert_allclose(p.velocity(x - t[0] + 0.5), peer(t, V)(x), rtol=1e-11)
@@ -141,7 +144,7 @@ def test_the_lowest_load_of_a_spline_is_that_between_its_samples() -> None:
     # Contact is lost near t = 2.44 s; at all samples, and halfway between, the load is positive.
     time, load = np.arange(6.0), np.array([7.44, 5.44, 0.54, 0.49, 2.44, 7.44])
     (segment,) = Programme(Follow(time, load, interpolant="spline"), **START).segments
-    values = segment.load(np.linspace(0, 5, 100_001))[0]
+    values = load_of(segment, np.linspace(0, 5, 100_001))
     assert segment.lowest_load == pytest.approx(float(np.min(values)), abs=1e-6)
     assert segment.lowest_load < 0
 

@@ -52,15 +52,6 @@ class ProgrammeSegment(eqx.Module):
         The shear force acts along the pulling direction, in addition to the spring's.
         """
 
-    def load(self, t: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
-        """W (N) and dW/dt (N/s) at the time `t` (s) of the segment."""
-        at = self.at(t, 1.0, 1.0)
-        return at.w, at.w_slope
-
-    def pull(self, t: ArrayLike) -> ArrayLike:
-        """Velocity of the far end of the spring (m/s)."""
-        return self.at(t, 1.0, 1.0).pull
-
     @abstractmethod
     def position(self, t: ArrayLike) -> Array:
         """Displacement of the far end of the spring since the beginning of the segment (m)."""
@@ -100,8 +91,8 @@ class ProgrammeSegment(eqx.Module):
 
 
 #: W (N) and the pulling velocity (m/s) of a segment at times (s), each by one program.
-load_of = jax.jit(lambda segment, t: segment.load(t)[0])
-pull_of = jax.jit(lambda segment, t: segment.pull(t))
+load_of = jax.jit(lambda segment, t: segment.at(t, 1.0, 1.0).w)
+pull_of = jax.jit(lambda segment, t: segment.at(t, 1.0, 1.0).pull)
 
 
 class HarmonicSegment(ProgrammeSegment):
