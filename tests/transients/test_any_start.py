@@ -10,6 +10,7 @@ from asperity.loads import Hold, Modulate, Programme, Slide
 from asperity.operating_point import numbers_for, sourced_numbers
 from asperity.slider.parameters import slider_from
 from asperity.transients import step_size
+from asperity.transients.dense_output import Interval
 from asperity.transients.events import _SENTENCES
 from references.populations import population
 
@@ -149,13 +150,14 @@ def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
                 Y, jnp.asarray(error), jnp.asarray(factor), memory, False, (Y,)
             )
 
-        zero, Y = jnp.zeros(()), jnp.zeros(2)
+        zero, one = jnp.zeros(()), jnp.ones(())
         limits = 0.999999, 6.0
-        return jax.jit(
-            lambda h: step_size.run_steps(
-                system, jnp.ones(()), zero, Y, h, jnp.ones(()), attempt, zero, limits
-            )
-        )
+
+        def run(h):
+            interval = Interval(zero, jnp.zeros(2), h, one, one)
+            return step_size.run_steps(system, interval, attempt, zero, limits)
+
+        return jax.jit(run)
 
     # Shortened by a tenth only, it takes longer than a chunk to vanish.
     slow = attempts(2.0, 1.0)(jnp.asarray(1e308))

@@ -20,12 +20,12 @@ from jax.typing import ArrayLike
 
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic, Slider
-from asperity.transients.equations import SegmentEquations
-from asperity.transients.explicit import attempt_step
+from asperity.transients.equations import SegmentEquations, Tolerances
+from asperity.transients.explicit import LIMITS, attempt_step
+from asperity.transients.step_size import next_length
 
 #: Tolerated error of a step: of logarithms and relative error of forces; absolute error of forces.
-_RTOL, _ATOL = 1e-11, 1e-13
-_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+_TOLERANCES = Tolerances(rtol=1e-11, atol=1e-13)
 
 #: Largest number of steps of a motion, with rejected ones.
 MOST_STEPS = 60_000
@@ -166,11 +166,9 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
         t, Y, slope, h = run.next
         cut = t + h >= drive.until
         h = jnp.where(cut, drive.until - t, stop_gradient(h))
-        trial = attempt_step(system, t, Y, h, slope, _RTOL, _ATOL, rolled=True)
+        trial = attempt_step(system, t, Y, h, slope, _TOLERANCES, rolled=True)
         good = trial.error < 1
-        factor = jnp.clip(_SAFETY * trial.error ** (-1 / 8), _SHRINK, _GROW)
-        factor = jnp.where(jnp.isfinite(trial.error), factor, _SHRINK)
-        h_next = stop_gradient(h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY)))
+        h_next = stop_gradient(next_length(h, trial, LIMITS))
 
         def accepted(new: Array, old: Array) -> Array:
             return jnp.where(good, new, old)
@@ -238,7 +236,7 @@ def _located(
         middle = right - f_right * (right - left) / (f_right - f_left)
         # The first length to try is that of the whole step.
         middle = jnp.where(n == 0, h, jnp.where(jnp.isfinite(middle), middle, 0.5 * (left + right)))
-        Y = attempt_step(system, step.t, step.Y, middle, step.slope, _RTOL, _ATOL, rolled=True).end
+        Y = attempt_step(system, step.t, step.Y, middle, step.slope, _TOLERANCES, rolled=True).end
         value = rising(Y)
         beyond = (value * f_right < 0) | (n == 0)
         left_new = jnp.where(beyond, right, left)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 #: Steps of a call of a compiled program.
 STEPS = 2048
@@ -15,6 +16,28 @@ PARTS = 4
 
 #: Status of a compiled program: more steps to take, or no accurate step.
 GOING_ON, UNDERFLOW = 0, 1
+
+
+class Interval(NamedTuple):
+    """Where steps begin, and how far they go.
+
+    Attributes
+    ----------
+    t, end : array
+        Times of the segment (s).
+    Y : array, shape (size + 1,)
+        States at `t`.
+    length : array
+        Length of the first step to try (s); 0 for a guess.
+    longest : array
+        Length that no step may exceed (s).
+    """
+
+    t: ArrayLike
+    Y: ArrayLike
+    length: ArrayLike
+    end: ArrayLike
+    longest: ArrayLike
 
 
 class StepChunk(NamedTuple):

@@ -36,6 +36,21 @@ _DIGITS = 1e-13
 _BATCH_SIZES = (64, 1024, 4096)
 
 
+class Tolerances(NamedTuple):
+    """Tolerances of a step.
+
+    Attributes
+    ----------
+    rtol : float
+        Relative error; absolute for states that are logarithms.
+    atol : float
+        Absolute error of F/W0, v/V and F_i/W.
+    """
+
+    rtol: float
+    atol: float
+
+
 class SegmentEquations(eqx.Module):
     """Rates in time of Y = (*states of the motion, x K / W0), x the displacement of the slider.
 
@@ -83,13 +98,14 @@ class SegmentEquations(eqx.Module):
         rates, x_rate = self.motion_rates(at, Y[:-1])
         return jnp.concatenate([rates, jnp.broadcast_to(x_rate, rates.shape[1:])[None]])
 
-    def scale(self, Y: Array, rtol: Array, atol: Array) -> Array:
+    def scale(self, Y: Array, tolerances: Tolerances) -> Array:
         """Error of a step that counts as 1, shape (size + 1,).
 
         An error of a logarithm is a relative error already. The displacement, which grows without
         bound, keeps the error of the force as long as its digits allow it.
         """
         free = np.append(self.motion.logarithms, True)
+        rtol, atol = tolerances
         scale = jnp.where(free, rtol, atol + rtol * jnp.abs(Y))
         scale = scale.at[-1].max(_DIGITS * jnp.abs(Y[-1]))
         names = self.motion.mechanical

@@ -17,12 +17,13 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import dormand_prince_8
-from asperity.transients.dense_output import StepChunk
-from asperity.transients.equations import SegmentEquations
+from asperity.transients.dense_output import Interval, StepChunk
+from asperity.transients.equations import SegmentEquations, Tolerances
 from asperity.transients.step_size import TrialStep, one_kernel, run_steps
 
 _SAFETY = 0.9
-_LIMITS = 0.2, 6.0
+#: Smallest and largest factor by which a step may change its length.
+LIMITS = 0.2, 6.0
 
 #: The method becomes unstable where the product of step and eigenvalue is about 6.1; from this
 #: smaller value on a step counts as limited by stability.
@@ -33,37 +34,20 @@ _STIFF = 5.0
 _UNSTABLE = 100.0
 
 
-def advance(
-    system: SegmentEquations, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
-) -> StepChunk:
-    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `run_steps`.
-
-    Parameters
-    ----------
-    rtol, atol : array
-        Tolerances of `SegmentEquations.scale`.
-    """
-    chunk = _run(system, t, Y, h, end, rtol, atol)
+def advance(system: SegmentEquations, interval: Interval, tolerances: Tolerances) -> StepChunk:
+    """Integrate over an interval, as `run_steps`, with dense output."""
+    chunk = _run(system, interval, tolerances)
     dense = _dense(system, chunk.begin, chunk.length, *chunk.coefficients)
     return chunk._replace(coefficients=dense)
 
 
 @one_kernel
-def _run(
-    system: SegmentEquations,
-    longest: Array,
-    t: Array,
-    Y: Array,
-    h: Array,
-    end: Array,
-    rtol: Array,
-    atol: Array,
-) -> StepChunk:
+def _run(system: SegmentEquations, interval: Interval, tolerances: Tolerances) -> StepChunk:
     def attempt(t: Array, Y: Array, h: Array, slope: Array) -> TrialStep:
-        return attempt_step(system, t, Y, h, slope, rtol, atol)
+        return attempt_step(system, t, Y, h, slope, tolerances)
 
-    slope = system.rates(system.at(t), Y)
-    return run_steps(system, longest, t, Y, h, end, attempt, slope, _LIMITS)
+    slope = system.rates(system.at(interval.t), interval.Y)
+    return run_steps(system, interval, attempt, slope, LIMITS)
 
 
 def attempt_step(
@@ -72,8 +56,7 @@ def attempt_step(
     Y: Array,
     h: Array,
     slope: Array,
-    rtol: Array,
-    atol: Array,
+    tolerances: Tolerances,
     *,
     rolled: bool = False,
 ) -> TrialStep:
@@ -107,7 +90,7 @@ def attempt_step(
             before = new
             new, stages = stage(k, table.A[k, :k], stages)
     slope = stages[12]
-    scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), rtol, atol)
+    scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), tolerances)
     fifth = jnp.square(_combined(table.E5, stages) / scale).sum()
     third = jnp.square(_combined(table.E3, stages) / scale).sum()
     error = h * fifth / jnp.sqrt((fifth + 0.01 * third + 1e-300) * size)

@@ -24,8 +24,8 @@ from jax import Array
 from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import solve_columns, spectral_radius, value_and_jacobian
 from asperity.loads import Excitation
-from asperity.transients.dense_output import StepChunk
-from asperity.transients.equations import SegmentEquations
+from asperity.transients.dense_output import Interval, StepChunk
+from asperity.transients.equations import SegmentEquations, Tolerances
 from asperity.transients.step_size import TrialStep, one_kernel, run_steps
 
 STAGES = 5
@@ -82,21 +82,12 @@ class _LastStep(NamedTuple):
 
 
 @one_kernel
-def advance(
-    system: SegmentEquations,
-    longest: Array,
-    t: Array,
-    Y: Array,
-    h: Array,
-    end: Array,
-    rtol: Array,
-    atol: Array,
-) -> StepChunk:
-    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
+def advance(system: SegmentEquations, interval: Interval, tolerances: Tolerances) -> StepChunk:
+    """Integrate over an interval, as `run_steps`, with dense output."""
     powers = jnp.asarray(_tableau().powers)
 
     def attempt(t: Array, Y: Array, h: Array, last: _LastStep) -> TrialStep:
-        scale = system.scale(Y, rtol, atol)
+        scale = system.scale(Y, tolerances)
         Z, error, steps, slope = _step(system, t, Y, h, _extrapolated(last, Y, h), scale)
         # After many Newton iterations the step should not grow.
         safety = _SAFETY * (2 * _NEWTON_STEPS + 1) / (2 * _NEWTON_STEPS + steps)
@@ -104,8 +95,8 @@ def advance(
         piece = (powers @ Z.T).at[0].set(Y)
         return TrialStep(Y + Z[:, -1], error, factor, _LastStep(piece, h), h * slope < _MILD, piece)
 
-    none = _LastStep(jnp.zeros((STAGES + 1, Y.shape[0])), jnp.zeros(()))
-    return run_steps(system, longest, t, Y, h, end, attempt, none, _LIMITS)
+    none = _LastStep(jnp.zeros((STAGES + 1, system.motion.size + 1)), jnp.zeros(()))
+    return run_steps(system, interval, attempt, none, _LIMITS)
 
 
 def _extrapolated(last: _LastStep, Y: Array, h: Array) -> Array:

@@ -17,9 +17,9 @@ from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
 from asperity.parameters.arguments import number, shown, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
-from asperity.transients.equations import SegmentEquations, states_after_jump
+from asperity.transients.equations import SegmentEquations, Tolerances, states_after_jump
 from asperity.transients.events import EventThresholds
-from asperity.transients.integration import NO_LOAD, Checkpoint, Integration, Tolerances
+from asperity.transients.integration import NO_LOAD, Checkpoint, Integration
 
 #: Number and largest length of the Newton steps for the states of the law under another load.
 _STEPS, _LEAP = 30, 2.0

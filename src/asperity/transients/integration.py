@@ -20,7 +20,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -29,10 +28,11 @@ from asperity.loads import Programme
 from asperity.loads.programme.segment import ProgrammeSegment, load_of
 from asperity.slider import Inertial, Motion, RadiatingAsperities, ReversingInertial, StiffInertial
 from asperity.transients import explicit, implicit
-from asperity.transients.dense_output import STEPS, UNDERFLOW, DenseOutput, StepChunk
+from asperity.transients.dense_output import STEPS, UNDERFLOW, DenseOutput, Interval, StepChunk
 from asperity.transients.equations import (
     MotionSamples,
     SegmentEquations,
+    Tolerances,
     states_across_break,
     step_samples,
 )
@@ -64,10 +64,6 @@ class Pace:
     most_steps: float
     _tried: bool = False
     _hopeless: int = 0
-
-    def enter(self) -> None:
-        """Begin a segment, whose break point may make the slider ring anew."""
-        self._tried, self._hopeless = False, 0
 
     def many(self, chunk: StepChunk, t: float, end: float) -> bool:
         """Whether too many steps remain to `end`, if all are as long as the steps of the chunk."""
@@ -198,21 +194,6 @@ class MethodChoice:
 NO_LOAD = 1e-6
 
 
-class Tolerances(NamedTuple):
-    """Tolerances of a step.
-
-    Attributes
-    ----------
-    rtol : float
-        Relative error; absolute for states that are logarithms.
-    atol : float
-        Absolute error of F/W0, v/V and F_i/W.
-    """
-
-    rtol: float
-    atol: float
-
-
 @dataclass
 class Checkpoint:
     """State of an integration from which it can be resumed.
@@ -319,7 +300,6 @@ class Integration:
         self._ringing = 0.0
         if isinstance(self.motion, Inertial) and self.method != "explicit":
             self._ringing = float(np.sqrt(self.motion.mobility / self.motion.strain))
-        self._pace = Pace(self._ringing > 0, self.most_steps)
 
     def segment_parts(self) -> Iterator[SegmentPart]:
         """Integrate from the checkpoint to the end of the programme, or to a termination."""
@@ -351,19 +331,21 @@ class Integration:
             yield self._standstill(system, start, Termination("loss of contact", start + lost))
             return
         self._detector.enter(system, start, here.steady)
-        self._pace.enter()
+        # Its break point may make the slider ring anew.
+        pace = Pace(self._ringing > 0, self.most_steps)
         t, Y = here.t, here.states
         length = here.length
         while t < end:
             method = implicit if ringless else self._choice.method
-            chunk, samples = self._advance(method, system, t, Y, length, end)
-            if not ringless and self._pace.should_try(chunk, t, end):
+            interval = Interval(t, Y, length, end, segment.longest_step)
+            chunk, samples = self._advance(method, system, interval)
+            if not ringless and pace.should_try(chunk, t, end):
                 without = self._system(segment, True)
-                trial, trial_samples = self._advance(implicit, without, t, Y, length, end)
-                if self._pace.gained(chunk, trial, t):
+                trial, trial_samples = self._advance(implicit, without, interval)
+                if pace.gained(chunk, trial, t):
                     chunk, samples, system, ringless = trial, trial_samples, without, True
             if not ringless:
-                self._choice.learn(chunk, self._pace.many(chunk, t, end))
+                self._choice.learn(chunk, pace.many(chunk, t, end))
             self._count(chunk, implicit if ringless else method, samples if ringless else None)
             dense_output = DenseOutput.of(chunk)
             reached = float(chunk.t)
@@ -373,7 +355,7 @@ class Integration:
             if termination is None and int(chunk.status) == UNDERFLOW:
                 termination = self._detector.underflow(reached, chunk.Y)
             if termination is None:
-                termination = self._pace.out_of_reach(chunk, t, end, start, self.steps)
+                termination = pace.out_of_reach(chunk, t, end, start, self.steps)
             if termination is not None:
                 events = [e for e in events if e.time <= termination.time]
                 events.append(Event(termination.time, termination.kind))
@@ -407,15 +389,9 @@ class Integration:
         return SegmentEquations(self.motion, segment, self._ringing if ringless else 0.0)
 
     def _advance(
-        self,
-        method: ModuleType,
-        system: SegmentEquations,
-        t: float,
-        Y: np.ndarray,
-        length: float,
-        end: float,
+        self, method: ModuleType, system: SegmentEquations, interval: Interval
     ) -> tuple[StepChunk, MotionSamples]:
-        chunk = method.advance(system, t, Y, length, end, *self.tolerances)
+        chunk = method.advance(system, interval, self.tolerances)
         samples, chunk = step_samples(system, chunk), jax.device_get(chunk)
         return chunk, samples
 

@@ -23,7 +23,7 @@ from jax import Array
 from jax.experimental.xla_metadata import set_xla_metadata
 
 from asperity.slider import ReversingInertial, StiffInertial
-from asperity.transients.dense_output import GOING_ON, STEPS, UNDERFLOW, StepChunk
+from asperity.transients.dense_output import GOING_ON, STEPS, UNDERFLOW, Interval, StepChunk
 from asperity.transients.equations import SegmentEquations
 
 _ATTRIBUTES = {"xla_cpu_small_call": "true", "inlineable": "false"}
@@ -48,15 +48,14 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Parameters
     ----------
     function : callable
-        Function of a `SegmentEquations`, the length that no step may exceed (s), which the compiled
-        function takes from the segment, and other arguments.
+        Function of a `SegmentEquations` and other arguments.
     """
     many, single = jax.jit(function), jax.jit(_as_one_kernel(function))
 
     @wraps(function)
     def call(system: SegmentEquations, *arguments: Any) -> Any:
         run = single if _compiles_to_one(system) else many
-        return run(system, system.segment.longest_step, *arguments)
+        return run(system, *arguments)
 
     return call
 
@@ -141,35 +140,35 @@ class TrialStep(NamedTuple):
     record: Any
 
 
+def next_length(h: Array, trial: TrialStep, limits: tuple[float, float]) -> Array:
+    """Length of the next step (s) after a trial of length `h`: shorter if that is rejected.
+
+    `limits` are the smallest and the largest factor.
+    """
+    factor = jnp.clip(trial.factor, *limits)
+    factor = jnp.where(jnp.isfinite(trial.error), factor, limits[0])
+    return h * jnp.where(trial.error < 1, factor, jnp.minimum(factor, _SAFETY))
+
+
 #: Time, states, length and memory -> a trial.
 StepAttempt = Callable[[Array, Array, Array, Any], TrialStep]
 
 
 def run_steps(
     system: SegmentEquations,
-    longest: Array,
-    t: Array,
-    Y: Array,
-    h: Array,
-    end: Array,
+    interval: Interval,
     attempt: StepAttempt,
     memory: Any,
     limits: tuple[float, float],
 ) -> StepChunk:
-    """Integrate from `t` towards `end`: at most `STEPS` accepted steps and `_TRIALS` trial steps.
+    """Integrate over an interval: at most `STEPS` accepted steps and `_TRIALS` trial steps.
 
     The chunk has the records of the trials, (STEPS, ...), in place of the coefficients.
 
     Parameters
     ----------
     system : SegmentEquations
-    longest : array
-        Length that no step may exceed (s).
-    t, end : array
-        Times of the segment (s).
-    Y : array, shape (size + 1,)
-    h : array
-        Length of the first step to try (s), 0 for a guess.
+    interval : Interval
     attempt : callable
     memory : pytree of arrays
         Passed to the first step.
@@ -180,6 +179,7 @@ def run_steps(
     # of the clock, over which load and drive are constant.
     by_rest = isinstance(system.motion, StiffInertial | ReversingInertial)
     shortest = _SHORTEST if by_rest else 0.0
+    t, Y, h, end, longest = interval
 
     def unfinished(carry: tuple[StepChunk, Any]) -> Array:
         run, _ = carry
@@ -196,9 +196,7 @@ def run_steps(
         h = jnp.where(cut, target - t, h)
         trial = attempt(t, run.Y, h, memory)
         good = trial.error < 1
-        factor = jnp.clip(trial.factor, *limits)
-        factor = jnp.where(jnp.isfinite(trial.error), factor, limits[0])
-        h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
+        h_next = next_length(h, trial, limits)
         # A length of NaN ends the loop, too.
         lost = ~good & ~(h_next > shortest if shortest else t + h_next > t)
 

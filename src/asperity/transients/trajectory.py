@@ -256,16 +256,13 @@ class Trajectory(Drawn):
     @typed
     def joined(cls, blocks: Sequence[Trajectory]) -> Trajectory:
         """One trajectory from blocks that follow each other."""
+        forces, motion = ("force", "load"), ("velocity", "slip_velocity", "displacement", "states")
         columns = {
             name: np.concatenate([getattr(b, name) for b in blocks])
-            for name in ("time", "force", "load", "velocity", "slip_velocity", "displacement")
+            for name in ("time", *forces, *motion)
         }
-        return dataclasses.replace(
-            blocks[-1],
-            **columns,
-            states=np.concatenate([b.states for b in blocks]),
-            events=tuple(e for b in blocks for e in b.events),
-        )
+        events = tuple(e for b in blocks for e in b.events)
+        return dataclasses.replace(blocks[-1], **columns, events=events)
 
     def to_dataset(self) -> xarray.Dataset:
         """The trajectory as a labelled dataset over time, ready for NetCDF.
