@@ -20,8 +20,8 @@ from asperity.air.layer import AirLayer
 from asperity.air.normal_contact import as_real
 from asperity.air.transfer import effective_modulation
 from asperity.arrays import Float
-from asperity.errors import InputError, require
-from asperity.parameters.arguments import typed
+from asperity.errors import require
+from asperity.parameters.arguments import broadcast_shape, typed
 
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
 #: monotone over decades, so that a few points a decade reveal it.
@@ -114,16 +114,6 @@ def gap(
     return _invert("h0", ratio, frequency, (W0, M, lambda_z), layer, bracket)
 
 
-def _check_single(*values: object) -> None:
-    for value in values:
-        parts = vars(value).values() if isinstance(value, AirLayer) else (value,)
-        shape = next((np.shape(p) for p in parts if np.ndim(p)), None)  # type: ignore[arg-type]
-        if shape is not None:
-            rule = "be single numbers"
-            advice = "call once for each measured fraction, as each may have several solutions"
-            raise InputError("inverse.arguments", rule, f"an array of shape {shape}", advice)
-
-
 def _invert(
     field: str,
     ratio: ArrayLike,
@@ -136,7 +126,10 @@ def _invert(
     W0, M, lambda_z = machine
     wanted = as_real("inverse.ratio", ratio, "dimensionless")
     frequency = as_real("inverse.frequency", frequency, "frequency", "not negative")
-    _check_single(wanted, frequency, layer, *machine)
+    shape = broadcast_shape("inverse", wanted, frequency, *machine, *vars(layer).values())
+    advice = "call once for each measured fraction, as each may have several solutions"
+    got = f"an array of shape {shape}"
+    require(shape == (), "inverse.arguments", "be single numbers", got, advice)
     target = float(np.log(wanted))
     ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
     rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"

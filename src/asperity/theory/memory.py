@@ -29,7 +29,7 @@ from jax.typing import ArrayLike
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import spectral_abscissa
 from asperity.arrays import Complex, Float
-from asperity.errors import InputError, require
+from asperity.errors import require
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.parameters import obeying
 from asperity.parameters.arguments import number, typed
@@ -139,12 +139,12 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
     slip : array or str
         Slip since the step (m).
     """
-    name, law = _one_of_three(law)
+    _require_closed_form(law)
     r = jnp.asarray(obeying(ratio, "state_after_step.ratio", "dimensionless", "positive"))
     u = obeying(slip, "state_after_step.slip", "length", "not negative") / law.D0
-    if name == "rice-ruina":
+    if type(law) is RiceRuina:
         return jnp.log1p((r - 1) * jnp.exp(-u))
-    if name == "ruina-slip":
+    if type(law) is RuinaSlip:
         return jnp.log(r) * jnp.exp(-u)
     T = jnp.tanh(u / 2)
     return jnp.log((r + T) / (1 + r * T))
@@ -202,9 +202,9 @@ def ageing_long_hold(
 
         leading = B ln y - B A ln(kappa/B)/(kappa - B),   renewal = B ln(1 - mean of s over t).
     """
-    if type(law) is not RiceRuina:
-        rule, got = "be the ageing law 'rice-ruina'", getattr(law, "name", type(law))
-        raise InputError("law", rule, got, "asperity.experiment.hold_response takes any law")
+    rule, got = "be the ageing law 'rice-ruina'", getattr(law, "name", type(law))
+    advice = "asperity.experiment.hold_response takes any law"
+    require(type(law) is RiceRuina, "law", rule, got, advice)
     V = obeying(velocity, "ageing_long_hold.velocity", "velocity", "positive")
     t = obeying(hold_time, "ageing_long_hold.hold_time", "time", "positive")
     k = obeying(stiffness, "ageing_long_hold.stiffness", "per_length", "positive")
@@ -253,20 +253,19 @@ def healing_rate_limit(law: RiceRuina) -> Array:
     in reloading they are renewed from v/V = y^(-1/2) on, y = V t/D0, where v Phi^(B/A) stays
     constant, which takes the share A/(2 B) of ln t.
     """
-    name, law = _one_of_three(law)
+    _require_closed_form(law)
     A, B = jnp.asarray(law.A), jnp.asarray(law.B)
-    if name == "rice-ruina":
+    if type(law) is RiceRuina:
         return _DECADE * B
-    if name == "ruina-slip":
+    if type(law) is RuinaSlip:
         return _DECADE * jnp.minimum(A, B)
     holds, rule = np.all(B > A / 2), "be above law.A / 2 for a healing rate in closed form"
     require(holds, "law.B", rule, "less", "integrate with asperity.experiment.hold_response")
     return _DECADE * (B - A / 2)
 
 
-def _one_of_three(law: Any) -> tuple[str, RiceRuina]:
-    if type(law) not in (RiceRuina, RuinaSlip, PerrinRiceZheng):
-        name = getattr(law, "name", type(law).__name__)
-        advice = "asperity.experiment has the same for any law by integration"
-        raise InputError("law", "be rice-ruina, ruina-slip or perrin-rice-zheng", name, advice)
-    return law.name, law
+def _require_closed_form(law: Any) -> None:
+    rule = "be rice-ruina, ruina-slip or perrin-rice-zheng"
+    got = getattr(law, "name", type(law).__name__)
+    advice = "asperity.experiment has the same for any law by integration"
+    require(type(law) in (RiceRuina, RuinaSlip, PerrinRiceZheng), "law", rule, got, advice)
