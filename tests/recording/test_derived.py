@@ -205,3 +205,18 @@ def test_a_derived_clock_needs_no_column_of_times(tmp_path):
     trace = read(path, channels={"time": "cumulative(dt)"})
     assert np.allclose(np.diff(trace.time[:5]), [2e-3, 1e-3, 2e-3, 1e-3])
     assert trace.provenance["time"] == "derived: cumulative(dt)"
+
+
+@pytest.mark.parametrize(
+    ("channels", "message"),
+    [
+        ({"force": "zero(F, 0 s, 5 s)", "time": "cumulative(dt)"}, "write the expression for time"),
+        ({"rate": "derivative(F)", "time": "cumulative(dt)"}, r"channels\['rate'\] .* no finite"),
+        ({"time": "2*time"}, r"channels\['time'\] must give numbers, got no finite one"),
+    ],
+)
+def test_there_are_no_times_before_the_expression_for_time(tmp_path, channels, message):
+    path = tmp_path / "steps.csv"
+    path.write_text("dt (ms),F (N)\n" + "".join(f"{1 + i % 2},{i}.5\n" for i in range(30)))
+    with pytest.raises(InputError, match=message):
+        read(path, channels=channels)

@@ -34,9 +34,9 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         Expressions by the name of the new channel, such as ``{"load": "Conf.Press - (Up.Pore.Press
         + Dwn.Pore.Press)/2", "force": "zero(Force, 0 s, 5 s) / (20 mm * 36 mm)"}``; see
         `asperity.recording.expressions` for the grammar. A name of a role, such as ``load`` or
-        ``force``, gives that role to the channel; ``time`` makes a new time axis. An expression
-        may use channels of earlier expressions. A recorded channel of the same name is kept as
-        ``NAME (recorded)``.
+        ``force``, gives that role to the channel; ``time`` makes a new time axis, which expressions
+        before it do not have. An expression may use channels of earlier expressions. A recorded
+        channel of the same name is kept as ``NAME (recorded)``.
 
     Returns
     -------

@@ -270,10 +270,12 @@ class _Expression:
                     self._fail("have stretches in time", _described(edge), example)
             inside = (time >= start.values) & (time <= end.values)
             if not inside.any():
+                known = np.isfinite(time).any()
+                runs = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
                 self._fail(
                     "have stretches that hold samples",
                     f"{float(start.values):g} s to {float(end.values):g} s",
-                    f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s",
+                    runs if known else "write the expression for time before this one",
                 )
         part = values[inside]
         level = np.float64(_STATISTICS[name](part) if np.isfinite(part).any() else np.nan)

@@ -14,7 +14,14 @@ Severity = Literal["note", "warning", "error"]
 
 #: Findings that may explain why a column is missing or has a wrong name.
 _COLUMNS = frozenset(
-    {"truncated", "heading mismatch", "other length", "short column", "text column"}
+    {
+        "truncated",
+        "heading mismatch",
+        "other length",
+        "several clocks",
+        "short column",
+        "text column",
+    }
 )
 
 

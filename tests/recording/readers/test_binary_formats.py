@@ -121,6 +121,76 @@ def test_recordings_of_different_length_must_be_chosen(tmp_path, planted):
         read(path, group="sloe")
 
 
+def in_hdf5(path, runs):
+    with h5py.File(path, "w") as file:
+        for name, (columns, interval) in runs.items():
+            group = file.create_group(name)
+            group.attrs["dt"] = interval
+            for label, values in columns.items():
+                group[label] = values
+    return path
+
+
+def in_matlab(path, runs):
+    structs = {name: {**columns, "dt": interval} for name, (columns, interval) in runs.items()}
+    scipy.io.savemat(path, structs)
+    return path
+
+
+def in_tdms(path, runs):
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject(name, label, values, {"wf_increment": interval})
+                for name, (columns, interval) in runs.items()
+                for label, values in columns.items()
+            ]
+        )
+    return path
+
+
+FORMATS = pytest.mark.parametrize("write", [in_hdf5, in_matlab, in_tdms])
+
+
+@FORMATS
+def test_a_chosen_group_has_its_own_interval(tmp_path, planted, write):
+    runs = {"fast": ({"W": planted.W}, 1e-3), "slow": ({"W": planted.W[:200]}, 1e-2)}
+    path = write(tmp_path / "two.dat.mat", runs)
+    for name, (_, interval) in runs.items():
+        assert read(path, group=name).time[1] == interval
+
+
+@FORMATS
+def test_intervals_that_differ_are_not_chosen_from(tmp_path, planted, write):
+    runs = {"one": ({"W": planted.W}, 1e-3), "other": ({"F": planted.F}, 1e-2)}
+    path = write(tmp_path / "two.dat.mat", runs)
+    with pytest.raises(InputError, match=r"0\.001 s from 0 s on and 0\.01 s .*, none of which was"):
+        read(path)
+    trace = read(path, rate="1 kHz")
+    assert trace.time[1] == 1e-3
+    assert "several clocks" in {f.name for f in trace.findings}
+
+
+def test_waveforms_that_begin_at_different_times_have_no_common_clock(tmp_path, planted):
+    path = tmp_path / "a.tdms"
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("run", n, v, {"wf_increment": 1e-3, "wf_start_offset": start})
+                for n, v, start in (("W", planted.W, 0.0), ("F", planted.F, 0.5))
+            ]
+        )
+    with pytest.raises(InputError, match=r"from 0 s on and 0\.001 s from 0\.5 s on"):
+        read(path)
+
+
+def test_a_table_may_have_more_columns_than_rows(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["run"] = np.array([(0.0, 5.0, 3.0), (1.0, 6.0, 4.0)], [(n, "f8") for n in "tWF"])
+    assert list(read(path).channels) == ["W", "F"]
+
+
 def test_a_vector_of_another_length_is_left_out_and_named(tmp_path, planted):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:

@@ -240,10 +240,8 @@ def read(
     expressions = {**rules.channels, **(channels or {})}
     file = Path(path)
     with _quiet() as warned:
-        clock = [name for name in expressions if role_of(name) == "time"]
-        if clock and rate is None:
-            # The recorded clock is an ordinary column until the expression for time is evaluated.
-            rate = "1 Hz"
+        # The recorded clock is an ordinary column until the expression for time is evaluated.
+        no_clock = rate is None and any(role_of(name) == "time" for name in expressions)
         recorded = raw_recording(
             _with_content(file),
             rules.format if format is None else format,
@@ -255,8 +253,10 @@ def read(
             file,
             {**rules.columns, **(columns or {})},
             {**rules.units, **(units or {})},
-            rate,
+            "1 Hz" if no_clock else rate,
         )
+        if no_clock:
+            trace = replace(trace, time=np.full(len(trace), np.nan))
         if expressions:
             trace = derive(trace, expressions)
     if recipe is not None:

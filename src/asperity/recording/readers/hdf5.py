@@ -9,12 +9,11 @@ import numpy as np
 
 from asperity.errors import InputError, known_as
 from asperity.recording.readers.raw import (
-    RawColumn,
+    Group,
     RawRecording,
     beginning,
-    group_columns,
-    interval_of,
-    one_table,
+    group_of,
+    one_recording,
 )
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -49,22 +48,16 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     """
     import h5py
 
-    columns: dict[str, list[RawColumn]] = {}
     with h5py.File(path, "r") as file:
-        groups = _groups(file, path)
+        nodes = _groups(file, path)
         matlab = any(item and "MATLAB_class" in item.attrs for item in file.values())
-        intervals = []
-        for name, node in groups.items():
-            columns[name], steps = _group(node, path, matlab)
-            intervals += steps
+        groups = {name: _group(node, path, matlab) for name, node in nodes.items()}
         chosen = file.get(group) if group else None
         if chosen is not None:
             # A group may have several names.
-            group = next((name for name, node in groups.items() if node == chosen), group)
-    kept, findings = one_table(columns, path, group)
-    step = next((step for step in intervals if step is not None), None)
-    provenance = {"format": "matlab 7.3" if matlab else "hdf5", "group": group or ""}
-    return RawRecording(kept, findings, provenance, step=step)
+            group = next((name for name, node in nodes.items() if node == chosen), group)
+    provenance = {"format": "matlab 7.3" if matlab else "hdf5"}
+    return one_recording(groups, path, group, provenance)
 
 
 def _groups(file: Any, path: Path) -> dict[str, Any]:
@@ -91,8 +84,8 @@ def _elsewhere(path: Path, name: str) -> InputError:
     return InputError("recording", "hold its data itself", got, "copy the data into one file")
 
 
-def _group(node: Any, path: Path, matlab: bool) -> tuple[list[RawColumn], list[float | None]]:
-    """Columns of a group, and the sampling intervals that it and its datasets state."""
+def _group(node: Any, path: Path, matlab: bool) -> Group:
+    """Columns of a group, and the clocks that it and its datasets state."""
     import h5py
 
     arrays: dict[str, Any] = {}
@@ -108,8 +101,7 @@ def _group(node: Any, path: Path, matlab: bool) -> tuple[list[RawColumn], list[f
     # A file of a computed motion marks what an instrument would have recorded of it.
     recorded = [key for key, about in attributes.items() if _ROLE in about]
     arrays = {key: arrays[key] for key in recorded} or arrays
-    columns, step = group_columns(arrays, attributes)
-    return columns, [*map(interval_of, [*attributes.values(), dict(node.attrs)]), step]
+    return group_of(arrays, attributes, dict(node.attrs))
 
 
 def _holds_values(item: Any) -> bool:

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from asperity.recording.readers.raw import (
-    RawColumn,
+    Group,
     RawRecording,
     beginning,
-    group_columns,
-    one_table,
+    group_of,
+    one_recording,
 )
 
 _SIGNATURE = b"MATLAB 5.0 MAT-file"
@@ -55,20 +55,16 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
         order = {b"IM": "<", b"MI": ">"}[raw[126:128]]
         _checked(raw, _HEADER, len(raw), order)
     variables = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
-    groups: dict[str, list[RawColumn]] = {}
-    steps: list[float | None] = []
+    groups: dict[str, Group] = {}
 
     def visit(arrays: Mapping[str, Any], name: str) -> None:
-        groups[name], step = group_columns(arrays)
-        steps.append(step)
+        groups[name] = group_of(arrays)
         for key, value in arrays.items():
             if isinstance(value, Mapping):
                 visit(value, f"{name}/{key}".strip("/"))
 
     visit({k: v for k, v in variables.items() if not k.startswith("__")}, "")
-    columns, left_out = one_table(groups, path, group)
-    step = next((s for s in steps if s is not None), None)
-    return RawRecording(columns, left_out, {"format": "matlab 5", "group": group or ""}, step=step)
+    return one_recording(groups, path, group, {"format": "matlab 5"})
 
 
 def _checked(raw: bytes, at: int, stop: int, order: str) -> list[tuple[int, int, int]]:

@@ -6,10 +6,10 @@ recording is decided here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ _UNITS = frozenset({"units", "unit", "columnunits", "channelunits", "unitnames"}
 _MOST_COLUMNS = 256
 #: Bytes that show the format of a file.
 _HEAD = 4096
+#: Clocks that differ by less than this share of their interval are one clock.
+_ONE_CLOCK = 0.01
 
 
 @typed
@@ -156,30 +158,61 @@ def as_texts(value: Any) -> list[str] | None:
     return texts if texts and all(isinstance(v, str) for v in texts) else None
 
 
-def group_columns(
-    arrays: Mapping[str, Any], attributes: Mapping[str, Mapping[str, Any]] | None = None
-) -> tuple[list[RawColumn], float | None]:
-    """Columns and sampling interval of the arrays of one group.
+class Stated(NamedTuple):
+    """A clock that a file states instead of a column of times.
+
+    Attributes
+    ----------
+    start, step : float
+        First time and interval (s).
+    rows : int or None
+        Length of the columns with this clock; None for columns of any length.
+    """
+
+    start: float
+    step: float
+    rows: int | None = None
+
+
+class Group(NamedTuple):
+    """Columns of a group of a file, and the clocks that the group and its columns state."""
+
+    columns: list[RawColumn]
+    clocks: list[Stated]
+
+
+def group_of(
+    arrays: Mapping[str, Any],
+    attributes: Mapping[str, Mapping[str, Any]] | None = None,
+    of_group: Mapping[str, Any] | None = None,
+) -> Group:
+    """Columns and clocks of the arrays of one group.
 
     Units may stand in an array's attributes, in a text of the group called like it with ``_unit``
-    or ``_units`` behind, or in a group ``units`` with a text of its name.
+    or ``_units`` behind, or in a group ``units`` with a text of its name. Sampling intervals may
+    stand in attributes of arrays or of the group, or in numbers of the group.
     """
     texts = {key: v for key, v in arrays.items() if as_texts(v) is not None}
     units = next(
         (v for k, v in arrays.items() if plain(k) in _UNITS and isinstance(v, Mapping)), {}
     )
-    columns = []
+    columns: list[RawColumn] = []
+    numbers = {k: v for k, v in arrays.items() if np.size(v) == 1}
+    steps = [(interval_of(numbers), None), (interval_of(of_group or {}), None)]
     for name, values in arrays.items():
         if isinstance(values, Mapping) or name in texts:
             continue
-        about = {**texts, **(attributes or {}).get(name, {})}
+        stated = (attributes or {}).get(name, {})
+        about = {**texts, **stated}
         for key in (f"{name}_unit", f"{name}_units"):
             if key in texts:
                 about = {"units": texts[key], **about}
         if name in units:
             about = {"units": units[name], **about}
-        columns += _columns_of(name, values, about)
-    return columns, interval_of({k: v for k, v in arrays.items() if np.size(v) == 1})
+        made = _columns_of(name, values, about)
+        columns += made
+        steps.append((interval_of(stated), made[0].values.size if made else None))
+    return Group(columns, [Stated(0.0, step, rows) for step, rows in steps if step is not None])
 
 
 def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawColumn]:
@@ -195,11 +228,11 @@ def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawCol
     """
     array = np.asarray(values)
     if array.dtype.names:
-        flat = array.reshape(-1)
-        units = _texts_in(about, _UNITS, len(array.dtype.names))
+        flat, names = array.reshape(-1), list(array.dtype.names)
+        units = _texts_in(about, _UNITS, len(names))
         return [
             RawColumn(field, np.ascontiguousarray(flat[field]), unit)
-            for field, unit in zip(array.dtype.names, units or [""] * flat.size, strict=False)
+            for field, unit in zip(names, units or [""] * len(names), strict=True)
             if flat[field].dtype.kind in "iuf" and flat[field].ndim == 1
         ]
     # What holds complex numbers is left out with a finding; a switch is 0 and 1.
@@ -232,22 +265,25 @@ def _texts_in(about: Mapping[str, Any], wanted: frozenset[str], number: int) -> 
     return None
 
 
-def one_table(
-    groups: Mapping[str, list[RawColumn]],
+def one_recording(
+    groups: Mapping[str, Group],
     path: Path,
     chosen: str | None,
+    provenance: Mapping[str, Any],
     noticed: Sequence[Finding] = (),
-) -> tuple[list[RawColumn], list[Finding]]:
-    """The columns of one length that make the recording, and findings about other columns.
+) -> RawRecording:
+    """The columns of one length in a file, with their clock and findings about other columns.
 
     Parameters
     ----------
-    groups : mapping of str to list of RawColumn
-        Columns by the group that they lie in.
+    groups : mapping of str to Group
+        By their paths.
     path : Path
         The file, for messages.
     chosen : str or None
         The group to read; without it all, if their longest columns are of one length.
+    provenance : mapping
+        Format and title.
     noticed : sequence of Finding
         Findings on the file: if it was cut off, columns are missing.
 
@@ -256,7 +292,7 @@ def one_table(
     InputError
         If there is nothing to read, or more than one recording.
     """
-    filled = {name: columns for name, columns in groups.items() if columns}
+    filled = {name: group.columns for name, group in groups.items() if group.columns}
     if chosen is not None:
         wanted = chosen.strip("/")
         if wanted not in filled:
@@ -274,8 +310,35 @@ def one_table(
         raise InputError("read.group", rule, f"none for {listed}", advice)
     rows = max(longest.values())
     kept = [c for columns in filled.values() for c in columns if c.values.size == rows]
-    short = [c for columns in filled.values() for c in columns if c.values.size != rows]
-    return kept, [_left_out(c, rows) for c in short]
+    findings = [
+        _left_out(c, rows) for columns in filled.values() for c in columns if c.values.size != rows
+    ]
+    clocks = _clocks(groups, filled, rows)
+    if len(clocks) > 1:
+        listed = " and ".join(f"{clock.step:g} s from {clock.start:g} s on" for clock in clocks)
+        text = f"Its columns have intervals of {listed}, none of which was used."
+        findings.append(Finding("several clocks", "note", len(clocks), "the file", text))
+    start, step, _ = clocks[0] if len(clocks) == 1 else (0.0, None, None)
+    about = {**provenance, "group": chosen or ""}
+    return RawRecording(kept, [*noticed, *findings], about, start, step)
+
+
+def _clocks(groups: Mapping[str, Group], used: Collection[str], rows: int) -> list[Stated]:
+    """Different clocks of columns of `rows` rows in the groups `used`.
+
+    Where these state none, those of the groups around them count, or of groups without columns.
+    """
+    around = [n for n in groups if not n or any(u.startswith(f"{n}/") for u in used)]
+    empty = [n for n, group in groups.items() if not group.columns]
+    for names in (used, around, empty):
+        clocks: list[Stated] = []
+        for clock in (c for n in names for c in groups[n].clocks if c.rows in (None, rows)):
+            limit = _ONE_CLOCK * clock.step
+            if not any(np.allclose(clock[:2], c[:2], rtol=0, atol=limit) for c in clocks):
+                clocks.append(clock)
+        if clocks:
+            return clocks
+    return []
 
 
 def _left_out(column: RawColumn, rows: int) -> Finding:

@@ -13,11 +13,13 @@ import numpy as np
 from asperity.errors import InputError, known_as
 from asperity.recording.finding import Finding
 from asperity.recording.readers.raw import (
+    Group,
     RawColumn,
     RawRecording,
+    Stated,
     beginning,
     interval_of,
-    one_table,
+    one_recording,
     refuse_truncated,
     truncated,
 )
@@ -44,23 +46,15 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     nptdms = library("recording", "be in a format that can be read here", path)
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
-        channels = {g.name: g.channels() for g in file.groups()}
-        groups = {name: [_column(c) for c in inside] for name, inside in channels.items()}
-    if not any(groups.values()):
+        groups = {group.name: _group(group.channels()) for group in file.groups()}
+    if not any(columns for columns, _ in groups.values()):
         raise refuse_truncated(path, "which is cut before its first channel, or has none")
     findings: list[Finding] = []
     if file.file_status.incomplete_final_segment:
         groups, finding = _whole_rows(path, groups)
         findings.append(finding)
-    columns, left_out = one_table(groups, path, group, findings)
-    used = channels[group.strip("/")] if group else [c for f in channels.values() for c in f]
-    start, step = _clock([c.properties for c in used], path)
-    provenance = {
-        "format": "tdms",
-        "group": group or "",
-        "title": str(file.properties.get("name", "")),
-    }
-    return RawRecording(columns, findings + left_out, provenance, start, step)
+    provenance = {"format": "tdms", "title": str(file.properties.get("name", ""))}
+    return one_recording(groups, path, group, provenance, findings)
 
 
 def library(name: str, rule: str, path: Path) -> Any:
@@ -85,44 +79,37 @@ def _quiet(nptdms: Any) -> Iterator[None]:
         manager.set_level(level)
 
 
-def _column(channel: Any) -> RawColumn:
-    values = channel[:] if len(channel) else np.empty(0)
-    unit = next((u for n in _UNITS if isinstance(u := channel.properties.get(n), str)), None)
-    return RawColumn(channel.name, np.asarray(values), unit)
+def _group(channels: list[Any]) -> Group:
+    """Columns of channels, and the clocks of those that are waveforms."""
+    columns, clocks = [], []
+    for channel in channels:
+        about = channel.properties
+        values = np.asarray(channel[:] if len(channel) else np.empty(0))
+        unit = next((u for n in _UNITS if isinstance(u := about.get(n), str)), None)
+        columns.append(RawColumn(channel.name, values, unit))
+        step = interval_of({"dt": about.get("wf_increment")})
+        if step is not None:
+            clocks.append(Stated(float(about.get("wf_start_offset", 0.0)), step, values.size))
+    return Group(columns, clocks)
 
 
-def _whole_rows(
-    path: Path, groups: dict[str, list[RawColumn]]
-) -> tuple[dict[str, list[RawColumn]], Finding]:
+def _whole_rows(path: Path, groups: dict[str, Group]) -> tuple[dict[str, Group], Finding]:
     """Columns of each group cut to the shortest, and the finding that says so."""
     cut = {}
     lost = 0
-    for name, columns in groups.items():
-        rows = [c.values.size for c in columns if c.values.size]
-        if not rows:
+    for name, (columns, clocks) in groups.items():
+        filled = [c for c in columns if c.values.size]
+        if not filled:
             continue
+        rows = [c.values.size for c in filled]
         kept = min(rows)
         lost += sum(rows) - kept * len(rows)
-        cut[name] = [RawColumn(c.label, c.values[:kept], c.unit) for c in columns if c.values.size]
+        cut[name] = Group(
+            [RawColumn(c.label, c.values[:kept], c.unit) for c in filled],
+            [clock._replace(rows=kept) for clock in clocks if clock.rows],
+        )
     if not cut:
         raise refuse_truncated(path, "which is cut before its first value")
     sentence = "its last segment is not whole; the rows that all channels have were read."
-    last = min(columns[0].values.size for columns in cut.values())
+    last = min(group.columns[0].values.size for group in cut.values())
     return cut, truncated(lost, f"row {last}", sentence)
-
-
-def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
-    """Start and interval of the waveforms, which must be one clock."""
-    stated = (interval_of({"dt": p["wf_increment"]}) for p in properties if "wf_increment" in p)
-    steps = {step for step in stated if step is not None}
-    if not steps:
-        return 0.0, None
-    if len(steps) > 1:
-        listed = " and ".join(f"{s:g} s" for s in sorted(steps))
-        rule, got = (
-            "be chosen where channels differ in interval",
-            f"{listed} in '{known_as(path).name}'",
-        )
-        raise InputError("read.group", rule, got, "choose a group, or give rate= to override them")
-    starts = [float(p.get("wf_start_offset", 0.0)) for p in properties if "wf_increment" in p]
-    return starts[0], steps.pop()
