@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest, printable, require
+from asperity.errors import InputError, printable, require, require_known
 from asperity.experiment.programmes import SlideHoldSlide, VelocitySteps
 from asperity.loads import (
     Follow,
@@ -84,9 +84,7 @@ def follow(channels: str, file: Path) -> Follow:
     """
     names = [name.strip().lower() for name in channels.split(" and ")]
     for name in names:
-        if name not in _CHANNELS:
-            rule = "name what is followed"
-            raise InputError("channels", rule, f"'{name}'", closest(name, _CHANNELS))
+        require_known(name, _CHANNELS, "channels", "name what is followed")
     advice = "save it as CSV with a heading such as 'time (s),load (N),velocity (um/s)'"
     try:
         trace = read(file)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require_known
 from asperity.outputs import output_file, written_file
 from asperity.parameters.arguments import typed
 from asperity.recording.trace import Trace
@@ -51,9 +51,7 @@ def write(
     """
     file = check_path(path)
     for name in units or {}:
-        if name not in trace.channels:
-            rule = "name channels"
-            raise InputError("write.units", rule, f"'{name}'", closest(name, trace.channels))
+        require_known(name, trace.channels, "write.units", "name channels")
     columns = _columns(trace, units or {})
     target = output_file(file, "write.path", example="recording.csv")
     with written_file(target, "write.path") as complete:

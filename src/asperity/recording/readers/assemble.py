@@ -13,7 +13,7 @@ from asperity.parameters.arguments import shown
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
 from asperity.recording.readers.missing import without_codes
-from asperity.recording.readers.raw import refuse_truncated
+from asperity.recording.readers.raw import unusable
 from asperity.recording.readers.units import (
     Unit,
     in_si,
@@ -78,7 +78,7 @@ def assemble(
         refused = error
         if any(f.name == "truncated" for f in findings) and "time" not in roles:
             left = listed(map(repr, names))
-            refused = refuse_truncated(path, f"which is cut so that no time but {left} is left")
+            refused = unusable(path, f"which is cut so that no time but {left} is left")
         raise with_cause(refused, findings) from None
     findings += clock.findings
     dropped = [n for n in names if n not in numbers and n != clock.column]

@@ -25,13 +25,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, closest, known_as, require
+from asperity.errors import Argument, InputError, known_as, require, require_known
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive, stress_to_force
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
-from asperity.recording.readers.raw import RawRecording, refuse_truncated
+from asperity.recording.readers.raw import RawRecording, unusable
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
@@ -70,9 +70,7 @@ def reader_named(name: str) -> Any:
     if name in FORMATS:
         return importlib.import_module(f"asperity.recording.readers.{name}")
     points = reader_points()
-    if name not in points:
-        known = closest(name, [*FORMATS, *points])
-        raise InputError("read.format", "be a format", f"'{name}'", known)
+    require_known(name, [*FORMATS, *points], "read.format", "be a format")
     try:
         reader = points[name].load()
     # Code of another package: any exception becomes a sentence for the user.
@@ -107,9 +105,8 @@ def format_of(path: Path) -> str:
         if reader_named(name).is_format(path):
             return name
     rule = "be CSV or other text, HDF5, MATLAB, TDMS or LOOK"
-    got = f"'{known_as(path).name}', which looks like none of them"
     advice = f"give {Argument('format', value='...')} if it is one of them"
-    raise InputError("recording", rule, got, advice)
+    raise unusable(path, "which looks like none of them", rule, advice)
 
 
 def raw_recording(
@@ -148,15 +145,14 @@ def raw_recording(
     except InputError:
         raise
     except MemoryError:
-        got = f"'{known_as(path).name}', which holds more"
-        raise InputError("recording", "fit into memory", got, "cut it") from None
+        raise unusable(path, "which holds more", "fit into memory", "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
         # The text of an OSError has the path, which the user may know by another name.
         text = getattr(error, "strerror", None) or error
         rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {text}"
         why = f"which may be cut or damaged: its reader could not read it ({why})"
-        raise refuse_truncated(path, why, rule) from None
+        raise unusable(path, why, rule) from None
     if not isinstance(recorded, RawRecording):
         rule, advice = "be a reader that returns a RawRecording", "correct the reader"
         raise InputError("read.format", rule, f"{type(recorded).__name__} of '{name}'", advice)
@@ -284,11 +280,8 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
 
 def _with_content(file: Path) -> Path:
     require(file.is_file(), "recording", "be a file", f"'{known_as(file)}'", "check the name")
-    got, advice = (
-        f"'{known_as(file).name}', which is empty",
-        "copy it again from where it was recorded",
-    )
-    require(file.stat().st_size != 0, "recording", "hold data", got, advice)
+    if not file.stat().st_size:
+        raise unusable(file, "which is empty", "hold data")
     return file
 
 

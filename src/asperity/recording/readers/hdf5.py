@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, known_as
+from asperity.errors import InputError
 from asperity.recording.readers.raw import (
     Group,
     RawRecording,
     beginning,
     group_of,
     one_recording,
+    unusable,
 )
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -80,8 +81,8 @@ def _groups(file: Any, path: Path) -> dict[str, Any]:
 
 
 def _elsewhere(path: Path, name: str) -> InputError:
-    got = f"'{known_as(path).name}', whose '{name.strip('/')}' lies in another file"
-    return InputError("recording", "hold its data itself", got, "copy the data into one file")
+    why = f"whose '{name.strip('/')}' lies in another file"
+    return unusable(path, why, "hold its data itself", "copy the data into one file")
 
 
 def _group(node: Any, path: Path, matlab: bool) -> Group:
@@ -121,8 +122,8 @@ def _value(item: Any, path: Path, matlab: bool) -> Any:
         raise _elsewhere(path, item.name)
     if item.nbytes > max(_MUCH, _PACKED * path.stat().st_size):
         # Declared values that were never written are fill values, and would be created here.
-        got = f"'{known_as(path).name}', whose '{item.name.strip('/')}' has {item.size} values"
-        raise InputError("recording", "hold what it declares", got, "remove that dataset")
+        why = f"whose '{item.name.strip('/')}' has {item.size} values"
+        raise unusable(path, why, "hold what it declares", "remove that dataset")
     if matlab and item.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
     if h5py.check_ref_dtype(item.dtype) is not None:

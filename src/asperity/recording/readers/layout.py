@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
-from asperity.errors import Argument, InputError, known_as, require
+from asperity.errors import Argument, InputError, require
+from asperity.recording.readers.raw import unusable
 from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
@@ -423,9 +424,8 @@ def layout_of(
     )
     if not sample or score < 0.5:
         named = [Argument(name, value="...") for name in ("delimiter", "decimal")]
-        got = f"'{known_as(path).name}' without one that is understood"
         advice = f"give {named[0]} and {named[1]}, or another file"
-        raise InputError("recording", "hold a table of numbers", got, advice)
+        raise unusable(path, "which has none that is understood", "hold a table of numbers", advice)
     rows = [cells_of(text, separators[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]
     closed = width > 1 and separators[0] is not None and not any(row[-1] for row in rows)

@@ -22,7 +22,7 @@ import numpy as np
 
 from asperity.errors import Argument
 from asperity.recording.finding import Finding
-from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, refuse_truncated
+from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, unusable
 from asperity.recording.roles import candidates
 
 _START = struct.Struct(">20siiif")
@@ -75,7 +75,7 @@ def read(path: Path) -> RawRecording:
     raw = np.fromfile(path, dtype=np.uint8)
     readings = _headers(raw[: 1 << 12].tobytes())
     if not readings:
-        raise refuse_truncated(path, "whose LOOK header is not whole or not one")
+        raise unusable(path, "whose LOOK header is not whole or not one")
     pairs = [
         (header, dtype)
         for header in readings
@@ -83,7 +83,7 @@ def read(path: Path) -> RawRecording:
         if header.size + header.elements * np.dtype(dtype).itemsize == raw.size
     ]
     if not pairs:
-        raise refuse_truncated(path, "which has another number of values than its LOOK header says")
+        raise unusable(path, "which has another number of values than its LOOK header says")
     scores = [_plausibility(raw, *pair) for pair in pairs]
     best = int(np.argmax(scores))
     header, dtype = pairs[best]

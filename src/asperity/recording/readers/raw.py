@@ -115,9 +115,13 @@ def truncated(number: float, where: str, sentence: str, sure: bool = True) -> Fi
     return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
 
-def refuse_truncated(path: Path, why: str, rule: str = "be a whole file") -> InputError:
+def unusable(
+    path: Path,
+    why: str,
+    rule: str = "be a whole file",
+    advice: str = "copy it again from where it was recorded",
+) -> InputError:
     """The error for a file of which nothing can be used."""
-    advice = "copy it again from where it was recorded"
     return InputError("recording", rule, f"'{known_as(path).name}', {why}", advice)
 
 
@@ -300,8 +304,8 @@ def one_recording(
             refused = InputError("read.group", "be a group with columns", f"'{chosen}'", advice)
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
-    rule, got = "hold columns of numbers", f"'{known_as(path).name}' with none"
-    require(filled, "recording", rule, got, "give a recording")
+    if not filled:
+        raise unusable(path, "which has none", "hold columns of numbers", "give a recording")
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:
         listed = ", ".join(f"{name!r} ({rows} rows)" for name, rows in longest.items())

@@ -20,8 +20,8 @@ from asperity.recording.readers.raw import (
     beginning,
     interval_of,
     one_recording,
-    refuse_truncated,
     truncated,
+    unusable,
 )
 
 #: Properties that hold the unit of a channel.
@@ -48,7 +48,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
         file = nptdms.TdmsFile.read(path)
         groups = {group.name: _group(group.channels()) for group in file.groups()}
     if not any(columns for columns, _ in groups.values()):
-        raise refuse_truncated(path, "which is cut before its first channel, or has none")
+        raise unusable(path, "which is cut before its first channel, or has none")
     findings: list[Finding] = []
     if file.file_status.incomplete_final_segment:
         groups, finding = _whole_rows(path, groups)
@@ -109,7 +109,7 @@ def _whole_rows(path: Path, groups: dict[str, Group]) -> tuple[dict[str, Group],
             [clock._replace(rows=kept) for clock in clocks if clock.rows],
         )
     if not cut:
-        raise refuse_truncated(path, "which is cut before its first value")
+        raise unusable(path, "which is cut before its first value")
     sentence = "its last segment is not whole; the rows that all channels have were read."
     last = min(group.columns[0].values.size for group in cut.values())
     return cut, truncated(lost, f"row {last}", sentence)

@@ -16,10 +16,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from asperity.errors import InputError, known_as, require
+from asperity.errors import InputError
 from asperity.recording.finding import Finding
 from asperity.recording.readers.layout import MISSING, Layout, cells_of, digits, layout_of, lines_of
-from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, truncated
+from asperity.recording.readers.raw import (
+    RawColumn,
+    RawRecording,
+    beginning,
+    truncated,
+    unusable,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,18 +66,13 @@ def is_format(path: Path) -> bool:
     """
     head = beginning(path)
     for mark, kind in _ARCHIVES.items():
-        rule, advice = "be the recording itself", "unpack it, or save the sheet as CSV"
-        require(
-            not head.startswith(mark),
-            "recording",
-            rule,
-            f"'{known_as(path).name}', {kind}",
-            advice,
-        )
+        if head.startswith(mark):
+            advice = "unpack it, or save the sheet as CSV"
+            raise unusable(path, kind, "be the recording itself", advice)
     if kind := _document(head):
         # A table would be looked for in it at length.
-        rule, got = "hold a table of numbers", f"'{known_as(path).name}', which is {kind}"
-        raise InputError("recording", rule, got, "save it as CSV, or add a reader for it")
+        advice = "save it as CSV, or add a reader for it"
+        raise unusable(path, f"which is {kind}", "hold a table of numbers", advice)
     return head.startswith(_GZIP) or _is_text(head)
 
 
@@ -122,13 +123,13 @@ def _unpacked(path: Path) -> bytes:
     """Contents of a gzip file, which are to be a text of at most `LARGEST` bytes."""
     with gzip.open(path) as packed:
         text = packed.read(LARGEST + 1)
-    rule, got = (
-        f"unpack to at most {LARGEST // 1024**2} MB",
-        f"'{known_as(path).name}', which goes on",
-    )
-    require(len(text) <= LARGEST, "recording", rule, got, "unpack it, and see what it holds")
-    rule, got = "hold a text if it is packed", f"'{known_as(path).name}' with something else"
-    require(_is_text(text[: 1 << 12]), "recording", rule, got, "unpack it")
+    if len(text) > LARGEST:
+        rule = f"unpack to at most {LARGEST // 1024**2} MB"
+        raise unusable(path, "which goes on", rule, "unpack it, and see what it holds")
+    if not _is_text(text[: 1 << 12]):
+        raise unusable(
+            path, "which holds something else", "hold a text if it is packed", "unpack it"
+        )
     return text
 
 
@@ -154,8 +155,8 @@ def _load(
     layout = _layout(file, start, size, path, delimiter, decimal)
     ending = _ending_of(file, size, layout)
     frame, findings = _parse(file, layout, ending.stop)
-    got = f"'{known_as(path).name}' with a heading only"
-    require(len(frame), "recording", "hold rows of numbers", got, "give a recording")
+    if not len(frame):
+        raise unusable(path, "which has a heading only", "hold rows of numbers", "give a recording")
     frame, left_out = _without_text_rows(frame, layout.width)
     findings += left_out
     columns = []
