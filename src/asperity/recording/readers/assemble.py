@@ -21,6 +21,7 @@ from asperity.recording.readers.units import (
     required,
     split_labels,
     understood,
+    without_brackets,
 )
 from asperity.recording.roles import (
     ROLES,
@@ -56,13 +57,13 @@ def assemble(
     split = split_labels([c.label for c in recorded.columns])
     # Names of a damaged file may hold anything.
     names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
+    recorded_columns = dict(zip(names, recorded.columns, strict=True))
     texts = {}
-    for name, column, (_, unit_in_heading) in zip(names, recorded.columns, split, strict=True):
+    for (name, column), (_, unit_in_heading) in zip(recorded_columns.items(), split, strict=True):
         # The unit that the format states for the column goes before that in the heading.
-        stated_unit = "" if column.unit is None else column.unit
-        bare = stated_unit.strip().strip("[](){}").strip()
-        texts[name] = unit_in_heading if is_empty(stated_unit) else bare
-    headings = {name: c.label for name, c in zip(names, recorded.columns, strict=True)}
+        stated_unit = column.unit or ""
+        texts[name] = unit_in_heading if is_empty(stated_unit) else without_brackets(stated_unit)
+    headings = {name: column.label for name, column in recorded_columns.items()}
     try:
         roles = _chosen_roles(columns or {}, headings)
         stated = _by_name(units or {}, headings, roles)
@@ -70,8 +71,7 @@ def assemble(
         raise with_cause(error, findings) from None
     known = _known_units(texts, stated, findings)
     _check_kinds(roles, known)
-    values = {name: c.values for name, c in zip(names, recorded.columns, strict=True)}
-    numbers = {name: v for name, v in values.items() if v.dtype.kind in "iufb"}
+    values = {name: column.values for name, column in recorded_columns.items()}
     try:
         clock = settle_time(values, known, roles, rate, recorded)
     except InputError as error:
@@ -81,22 +81,20 @@ def assemble(
             refused = unusable(path, f"which is cut so that no time but {left} is left")
         raise with_cause(refused, findings) from None
     findings += clock.findings
-    dropped = [n for n in names if n not in numbers and n != clock.column]
+    channels, dropped = {}, []
+    for name, column in recorded_columns.items():
+        if name == clock.column:
+            continue
+        if column.values.dtype.kind not in "iufb":
+            dropped.append(name)
+            continue
+        unit = known.get(name)
+        numbers, missing = without_codes(column.values, name)
+        findings += missing
+        about = (unit.kind, unit.si) if unit else (None, "")
+        channels[name] = Channel(in_si(numbers, unit), *about, column.label, texts[name])
     if dropped:
         findings.append(_left_out(dropped))
-    channels = {}
-    for name, column in zip(names, recorded.columns, strict=True):
-        if name in numbers and name != clock.column:
-            unit, text = known.get(name), texts[name]
-            recorded_values, missing = without_codes(column.values, name)
-            findings += [missing] if missing else []
-            channels[name] = Channel(
-                in_si(recorded_values, unit),
-                unit.kind if unit else None,
-                unit.si if unit else "",
-                column.label,
-                text,
-            )
     findings = _folded(findings + _unknown(channels))
     provenance = {"file": known_as(path).name, **recorded.provenance, "time": clock.source}
     roles = {role: name for role, name in roles.items() if role != "time"}

@@ -217,8 +217,7 @@ def _headings(
         if _are_units(rows[k], rows[k - 1]):
             # Names stand right above their units, unless another row names more quantities.
             names = max([rows[k - 1], *rows[k - 2 : k - 1], *rows[k + 1 :]], key=_quantities)
-            units = [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[k]]
-            return Headings(_bare(names), units)
+            return Headings(_bare(names), rows[k])
     return Headings(_bare(rows[-1]), None, step)
 
 
@@ -240,7 +239,7 @@ def _names_of_another_width(
         rows.append([cell.strip('" ') for cell in cells])
     units: list[str] | None = None
     if len(rows) > 1 and len(rows[-1]) == len(rows[-2]) and _are_units(rows[-1], rows[-2]):
-        units = [_bracketed(c) or c for c in rows.pop()]
+        units = rows.pop()
     if not rows or len(rows[-1]) < 2 or _names_nothing(rows[-1]):
         return Headings([""] * width, None)
     names = _bare(rows[-1])
@@ -336,11 +335,6 @@ def _with_units(tokens: list[str]) -> list[str]:
     return joined
 
 
-def _bracketed(cell: str) -> str | None:
-    match = re.fullmatch(r"[\[({<](.*)[\])}>]", cell.strip())
-    return match[1].strip() if match else None
-
-
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
     """Whether a row holds units: at least a third of its cells do, and the names above do not."""
     known = sum(_is_unit(cell) for cell in row)
@@ -349,7 +343,8 @@ def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
 
 
 def _is_unit(cell: str) -> bool:
-    return not is_empty(cell) and (usual(cell) is not None or _bracketed(cell) is not None)
+    bracketed = re.fullmatch(r"[\[({<].*[\])}>]", cell.strip())
+    return not is_empty(cell) and bool(usual(cell) or bracketed)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from asperity.recording.finding import Finding
 _CODE = re.compile(r"-?9{3,}(?:\.(?:9+|25))?")
 
 
-def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
+def without_codes(values: Float, name: str) -> tuple[Float, list[Finding]]:
     """Values of a column, NaN in place of numbers that stand for a missing value.
 
     Parameters
@@ -30,8 +30,8 @@ def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
 
     Returns
     -------
-    (array, Finding or None)
-        The same array if it contains no such code.
+    (array, list of Finding)
+        The same array and no finding if it contains no such code.
     """
     kept = np.isfinite(values)
     codes: list[float] = []
@@ -39,7 +39,7 @@ def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
         codes.append(code)
         kept &= values != code
     if not codes:
-        return values, None
+        return values, []
     rows = np.flatnonzero(np.isin(values, codes))
     listed = " or ".join(f"{code:.12g}" for code in codes)
     text = (
@@ -47,7 +47,7 @@ def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
         f"{listed}, the first in row {rows[0]}, far from all others: read as missing."
     )
     finding = Finding("missing code", "warning", rows.size, f"{name}, row {rows[0]}", text)
-    return np.where(np.isin(values, codes), np.nan, values), finding
+    return np.where(np.isin(values, codes), np.nan, values), [finding]
 
 
 def _code_among(values: Float, kept: np.ndarray) -> float | None:

@@ -113,8 +113,13 @@ def usual(text: str) -> Unit | None:
     return None
 
 
+def without_brackets(text: str) -> str:
+    """A unit as a table writes it, without brackets and blanks around it."""
+    return text.strip().strip("[](){}<>").strip()
+
+
 def _bare(text: str) -> str:
-    return normalised(text.strip().strip("[](){}").strip())
+    return normalised(without_brackets(text))
 
 
 def _worded(text: str) -> str:
