@@ -110,13 +110,8 @@ def name_by(
 ) -> Naming:
     """Set the naming until the next call, as `naming`; returns the naming before."""
     earlier = _naming.get()
-    _naming.set(
-        Naming(
-            earlier.words if words is None else words,
-            earlier.symbols if symbols is None else symbols,
-            earlier.files if files is None else files,
-        )
-    )
+    now = words or earlier.words, symbols or earlier.symbols
+    _naming.set(Naming(*now, earlier.files if files is None else files))
     return earlier
 
 
@@ -142,6 +137,22 @@ def naming(
         yield
     finally:
         _naming.set(earlier)
+
+
+@contextmanager
+def keys_of_file(keys: Mapping[str, str]) -> Iterator[None]:
+    """Name the keys of a file in messages about arguments.
+
+    Parameters
+    ----------
+    keys : mapping of str to str
+        Keys by the names of the arguments; other arguments are keys of the same name.
+    """
+    with naming(lambda found: in_files(found._replace(name=keys.get(found.name, found.name)))):
+        try:
+            yield
+        except InputError as error:
+            raise error.worded() from None
 
 
 def symbol(name: str) -> str:

@@ -60,7 +60,6 @@ def sourced_numbers(
     material: Material | None,
     origin: str = "given",
     law: str | None = None,
-    place: str = "",
 ) -> dict[str, SourcedNumber]:
     """Numbers by name: the given numbers, completed by those of the material.
 
@@ -73,8 +72,6 @@ def sourced_numbers(
         Name of the source of the given numbers.
     law : str, optional
         The law that they are for.
-    place : str
-        The table of a file that has the given numbers; empty for arguments, options and sliders.
 
     Raises
     ------
@@ -84,7 +81,7 @@ def sourced_numbers(
     known = known_parameters(law)
     numbers: dict[str, SourcedNumber] = {}
     for written, value in given.items():
-        field = Argument(f"{place}.{written}") if place else Argument("numbers", key=written)
+        field = Argument("numbers", key=written)
         name = known_name(written, known, field)
         require(name not in numbers, field, "be given once", f"{symbol(name)} too", "leave one out")
         if isinstance(value, SourcedNumber):
@@ -116,7 +113,6 @@ def numbers_for(
     numbers: Mapping[str, SourcedNumber],
     among: Mapping[str, Parameter] | None = None,
     needed: tuple[str, ...] = (),
-    place: str = "",
 ) -> dict[str, SourcedNumber]:
     """The numbers of a point with this law, selected from `numbers`.
 
@@ -128,8 +124,6 @@ def numbers_for(
         Parameters that count; by default all of a point with this law.
     needed : tuple of str
         Parameters that must be given, in addition to those without a default.
-    place : str
-        Table of a file that states them, as of `sourced_numbers`.
 
     Raises
     ------
@@ -144,16 +138,15 @@ def numbers_for(
         if name not in numbers and (parameter.default is None or name in needed)
     ]
     if missing:
-        raise without_numbers(law_name, missing, known, place)
+        raise without_numbers(law_name, missing, known)
     return {name: numbers[name] for name in known if name in numbers}
 
 
 def without_numbers(
-    law_name: str, missing: Sequence[str], known: Mapping[str, Parameter], place: str = ""
+    law_name: str, missing: Sequence[str], known: Mapping[str, Parameter]
 ) -> InputError:
     """The mistake of a point whose law lacks numbers; arguments as of `numbers_for`."""
-    name, example = missing[0], known[missing[0]].example
-    like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
+    like = Argument("numbers", missing[0], known[missing[0]].example)
     advice = f"name a material that has them or give each one, like {like}"
     return InputError(law_name, "have all its numbers", f"none for {symbols(missing)}", advice)
 
@@ -176,7 +169,6 @@ def point_numbers(
     origin: str = "given",
     among: Mapping[str, Parameter] | None = None,
     needed: tuple[str, ...] = (),
-    place: str = "",
 ) -> dict[str, SourcedNumber]:
     """All numbers of a point in SI, with their sources.
 
@@ -187,8 +179,6 @@ def point_numbers(
         Name of the source of `point.parameters`.
     among, needed
         As in `numbers_for`.
-    place : str
-        As in `sourced_numbers`; with one, other parameters than those of `among` are refused.
 
     Raises
     ------
@@ -196,10 +186,7 @@ def point_numbers(
         If law or material are unknown, a name belongs to other laws or to nothing, a number is
         missing or breaks its rule, or a given number has no influence.
     """
-    offered = offered_numbers(point, origin, place)
-    for name in point.parameters if place and among is not None else ():
-        known_name(name, among or {}, f"{place}.{name}")
-    numbers = numbers_for(point.law, offered, among, needed, place)
+    numbers = numbers_for(point.law, offered_numbers(point, origin), among, needed)
     if among is None or "inertia" in among:
         require_given_influence(numbers, origin)
     return numbers
@@ -228,15 +215,13 @@ def require_given_influence(
     require_influence(given, {**values, **dict.fromkeys(varied, 1.0)})
 
 
-def offered_numbers(
-    point: Point, origin: str = "given", place: str = ""
-) -> dict[str, SourcedNumber]:
+def offered_numbers(point: Point, origin: str = "given") -> dict[str, SourcedNumber]:
     """Numbers of a point of which some come from elsewhere; arguments as of `point_numbers`."""
     if not point.law:
         advice = f"choose one of {', '.join(sorted(registered()))}"
         raise InputError("law", "be given", "nothing", advice)
     refuse_foreign(point.law, point.parameters)
-    return sourced_numbers(point.parameters, material_of(point), origin, point.law, place)
+    return sourced_numbers(point.parameters, material_of(point), origin, point.law)
 
 
 def material_of(point: Point) -> Material | None:
@@ -327,9 +312,7 @@ def lacking(name: str, numbers: Mapping[str, Any]) -> str:
     return other if numbers.get(name) and not numbers.get(other) else ""
 
 
-def require_influence(
-    names: Iterable[str], numbers: Mapping[str, Any], field: str = "", place: str = ""
-) -> None:
+def require_influence(names: Iterable[str], numbers: Mapping[str, Any], field: str = "") -> None:
     """Refuse a number on which no response depends, such as M without inertia.
 
     Parameters
@@ -340,8 +323,6 @@ def require_influence(
         All numbers; one that varies has any value but 0.
     field : str
         A number in messages, of which ``{}`` is the name; by default an argument of its own.
-    place : str
-        As in `numbers_for`.
 
     Raises
     ------
@@ -350,8 +331,7 @@ def require_influence(
     for name in names:
         other = lacking(name, numbers)
         if other:
-            value = "1" if other == "inertia" else "0.1"
-            like = f"{place}.{other} = {value}" if place else Argument("numbers", other, value)
+            like = Argument("numbers", other, "1" if other == "inertia" else "0.1")
             rule, got = (
                 f"have an influence, which it has with {symbol(other)}",
                 f"{symbol(other)} = 0",

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from pydantic import PrivateAttr, model_validator
 
-from asperity.errors import InputError, in_files, naming, require
+from asperity.errors import Argument, InputError, keys_of_file, require
 from asperity.laws import get_law, registered
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
-from asperity.parameters import MACHINE, law_parameters
+from asperity.parameters import MACHINE, known_name, law_parameters
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
 from asperity.questions.experiment import Experiment, ProtocolError
@@ -37,25 +35,14 @@ from asperity.transients.trajectory import planned_rows, row_bytes
 _COMPARED = 100
 
 
-#: Fields of a protocol by the arguments of a transient.
-_FIELDS = {
+#: Fields of a protocol by the arguments of a transient and of an operating point.
+FIELDS = {
     "initial": "start.states",
+    "numbers": "parameters",
     "programme.load": "start.load",
     "programme.velocity": "start.velocity",
     **{name: f"solver.{name}" for name in ("rtol", "most_steps")},
 }
-
-
-@contextmanager
-def fields_of_protocol() -> Iterator[None]:
-    """Name the fields of a protocol in messages about the arguments of a transient."""
-    with naming(
-        lambda argument: in_files(argument._replace(name=_FIELDS.get(argument.name, argument.name)))
-    ):
-        try:
-            yield
-        except InputError as error:
-            raise error.about(_FIELDS.get(error.field.name, error.field)) from None
 
 
 class Protocol(Experiment):
@@ -95,7 +82,7 @@ class Protocol(Experiment):
         if mistakes:
             raise ProtocolError(mistakes)
         # The programme as a whole may be invalid, such as one without duration.
-        with fields_of_protocol():
+        with keys_of_file(FIELDS):
             require_contact(self.programme, self._numbers["W0"].value)
             solver = self.integration
             initial, _ = solver.pop("initial"), solver.pop("sampling")
@@ -114,7 +101,11 @@ class Protocol(Experiment):
         advice = "add solver.inertia = true, or leave M out"
         counted, rule = self.solver.inertia or "M" not in self.parameters, "go with inertia"
         require(counted, "parameters.M", rule, "solver.inertia = false", advice)
-        return point_numbers(self, "protocol", among, needed, "parameters")
+        with keys_of_file(FIELDS):
+            numbers = point_numbers(self, "protocol", among, needed)
+            for name in self.parameters:
+                known_name(name, among, Argument("numbers", key=name))
+        return numbers
 
     def _level(self) -> LoadAndVelocity:
         load = self._numbers["W0"].value if self.start.load is None else self.start.load

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 
 from asperity import materials
+from asperity.errors import keys_of_file
 from asperity.outputs import (
     UnfinishedOutput,
     output_file,
@@ -25,7 +26,7 @@ from asperity.outputs import (
     undisturbed,
 )
 from asperity.parameters.arguments import FilePath, at_least, typed
-from asperity.protocol.protocol import Protocol, fields_of_protocol, load_protocol
+from asperity.protocol.protocol import FIELDS, Protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.slider import Slider, equation_of_motion
 from asperity.theory import closed_forms as cf
@@ -250,7 +251,7 @@ def run_protocol(
     duration = protocol.programme.duration
     with output.interruptible(lambda: f"{done.time:.6g} s of {duration:.6g} s"):
         while not done.finished:
-            with fields_of_protocol():
+            with keys_of_file(FIELDS):
                 done = _one_block(protocol, output, done, rows, progress)
             if progress is not None and math.isfinite(done.time):
                 progress(done.time, duration)

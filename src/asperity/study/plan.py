@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import model_validator
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, keys_of_file, require
 from asperity.laws import get_law, known_law
 from asperity.operating_point import (
     known_parameters,
@@ -127,11 +127,12 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         alone = [names[0] for names in columns if len(names) == 1]
         varied = dict.fromkeys(itertools.chain(*columns), 1.0)
         with _noted(mistakes):
-            require_influence(alone, {**numbers, **varied}, "axes.{}", "parameters")
+            require_influence(alone, {**numbers, **varied}, "axes.{}")
         with _noted(mistakes):
             fixed = [name for name, origin in origins.items() if origin == "plan"]
-            require_influence(fixed, {**numbers, **varied}, "parameters.{}", "parameters")
-        mistakes += _missing(laws, axes, numbers, supplied)
+            require_influence(fixed, {**numbers, **varied})
+        with _noted(mistakes):
+            mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
         raise PlanError(mistakes).shortened()
@@ -152,7 +153,8 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
 def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
     """Add an `InputError` of the block to the mistakes of a plan, which are reported together."""
     try:
-        yield
+        with keys_of_file({"numbers": "parameters"}):
+            yield
     except InputError as error:
         mistakes.append(error)
 
@@ -220,7 +222,7 @@ def _numbers(
     written = {n: v for n, v in plan.parameters.items() if canonical_name(n, known) not in ratios}
     varied = {column for axis in axes.values() for column in columns_of(axis)}
     targets = {RATIOS[n].target: n for n in {*ratios, *varied} & set(RATIOS)}
-    offered = sourced_numbers(written, material, "plan", laws[0] if laws else None, "parameters")
+    offered = sourced_numbers(written, material, "plan", laws[0] if laws else None)
     explicit = {canonical_name(name, known) for name in written}
     for name in sorted({*explicit, *ratios} & varied, key=str):
         rule = "be given once"
@@ -265,7 +267,7 @@ def _missing(
         known = point_parameters(get_law(law))
         missing = [n for n, p in known.items() if p.default is None and n not in present]
         if missing:
-            yield str(without_numbers(law, missing, known, "parameters"))
+            yield str(without_numbers(law, missing, known))
 
 
 def _present(axis: Mapping[str, Any], law: str) -> set[str]:
