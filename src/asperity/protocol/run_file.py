@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError
 from asperity.outputs import output_file, written_file
+from asperity.outputs.atomic import writable
 from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.columns import readable
 
@@ -62,22 +62,17 @@ def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
     import h5netcdf
 
     new = not done
-    try:
-        with h5netcdf.File(path, "w" if new else "r+") as file:
-            if new:
-                _lay_out(file, block)
-            begin = {name: done.get(name, 0) for name in CHUNKS}
-            end = {name: begin[name] + block.sizes[name] for name in CHUNKS}
-            for dimension, length in end.items():
-                file.resize_dimension(dimension, length)
-            for name, variable in block.variables.items():
-                head = str(variable.dims[0])
-                if head in CHUNKS and variable.sizes[head]:
-                    file.variables[name][begin[head] : end[head]] = _writable(variable.values)
-    except OSError as error:
-        why = error.strerror or "it is damaged"
-        got, advice = f"'{path}' ({why})", "choose a folder that exists, is writable and has room"
-        raise InputError("out", "be a file that can be written", got, advice) from None
+    with writable(path), h5netcdf.File(path, "w" if new else "r+") as file:
+        if new:
+            _lay_out(file, block)
+        begin = {name: done.get(name, 0) for name in CHUNKS}
+        end = {name: begin[name] + block.sizes[name] for name in CHUNKS}
+        for dimension, length in end.items():
+            file.resize_dimension(dimension, length)
+        for name, variable in block.variables.items():
+            head = str(variable.dims[0])
+            if head in CHUNKS and variable.sizes[head]:
+                file.variables[name][begin[head] : end[head]] = _as_stored(variable.values)
 
 
 def describe(path: Path, attributes: Mapping[str, Any]) -> None:
@@ -107,10 +102,10 @@ def _lay_out(file: Any, block: xarray.Dataset) -> None:
         for key, value in variable.attrs.items():
             made.attrs[key] = value
         if variable.dims[0] not in CHUNKS:
-            made[...] = _writable(variable.values)
+            made[...] = _as_stored(variable.values)
 
 
-def _writable(values: np.ndarray) -> np.ndarray:
+def _as_stored(values: np.ndarray) -> np.ndarray:
     return values.astype(object) if values.dtype.kind == "U" else values
 
 

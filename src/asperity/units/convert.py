@@ -17,6 +17,7 @@ from asperity.units.scale import EXACT, normalised, unit_factor
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
 #: Larger powers of ten overflow a double in any unit.
 _LARGEST_POWER = 5000
+_WITHIN = "lie within the range of double precision"
 #: Largest length of a user's text in a message.
 _SHOWN = 63
 
@@ -61,7 +62,7 @@ def to_si(value: Any, kind: str, name: str) -> Any:
     if isinstance(value, list | tuple):
         return _stacked([to_si(v, kind, name) for v in value], name)
     if isinstance(value, int) and not abs(value) < 10**308:
-        raise _beyond_doubles(name, "an integer of more than 308 figures", spec)
+        raise _refused(name, _WITHIN, "an integer of more than 308 figures", spec)
     return _number_to_si(value, spec, name)
 
 
@@ -204,24 +205,22 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     spec = kind_of(kind)
     match = _NUMBER.fullmatch(text)
     if match is None:
-        rule = f"be a finite number{' with a unit' if spec.si else ''}"
-        raise InputError(name, rule, _quoted(text), f"write it like '{spec.example}'")
+        raise _refused(name, f"be a finite number{' with a unit' if spec.si else ''}", text, spec)
     if re.match(r",\d", match[3]):
         advice = f"write it like '{spec.example}', without commas"
         raise InputError(name, "have a decimal point", _quoted(text), advice)
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
-        rule = "carry a unit"
-        raise InputError(name, rule, _quoted(text), f"write it like '{spec.example}'")
+        raise _refused(name, "carry a unit", text, spec)
     factor = unit_factor(unit, kind, name, printable(text, _SHOWN))
     power = _power_of_ten(match[2] or "0")
     # `Decimal` has a largest exponent; beyond it only zero is a number.
     if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
-        raise _beyond_doubles(name, text, spec)
+        raise _refused(name, _WITHIN, text, spec)
     value = float(EXACT.multiply(digits.scaleb(power if digits else 0, EXACT), factor))
     # Below the smallest normal double a number has few digits, and its reciprocal may be infinite.
     if math.isinf(value) or (digits and abs(value) < sys.float_info.min):
-        raise _beyond_doubles(name, text, spec)
+        raise _refused(name, _WITHIN, text, spec)
     return value
 
 
@@ -231,13 +230,8 @@ def _power_of_ten(text: str) -> int:
     return sign * (int(figures or "0") if len(figures) < 10 else 10**10)
 
 
-def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
-    return InputError(
-        name,
-        "lie within the range of double precision",
-        _quoted(text),
-        f"write it like '{spec.example}'",
-    )
+def _refused(name: str, rule: str, text: str, spec: Kind) -> InputError:
+    return InputError(name, rule, _quoted(text), f"write it like '{spec.example}'")
 
 
 def _quoted(text: str) -> str:
