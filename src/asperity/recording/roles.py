@@ -25,35 +25,28 @@ class Role:
         Other names of the role itself.
     whole : frozenset of str
         Whole names, lower case without separators.
-    words : tuple of str
-        Beginnings of words; a name of the role has a word with such a beginning.
+    words : frozenset of str
+        Words; a name of the role has one of them.
     weak : frozenset of str
         Whole names that count only where nothing else fits.
-    without : tuple of str
-        Beginnings of words that rule the name out.
+    without : frozenset of str
+        Words that rule the name out.
     kinds : frozenset of str
         Allowed kinds of the unit; an unknown unit is allowed, too.
     """
 
     also: frozenset[str]
     whole: frozenset[str]
-    words: tuple[str, ...]
-    weak: frozenset[str]
-    without: tuple[str, ...]
+    words: frozenset[str]
     kinds: frozenset[str]
+    weak: frozenset[str] = frozenset()
+    without: frozenset[str] = frozenset()
 
 
-def _role(
-    also: str, whole: str, words: str, weak: str = "", without: str = "", kinds: str = ""
-) -> Role:
-    return Role(
-        frozenset(also.split(",")) - {""},
-        frozenset(whole.split()),
-        tuple(words.split()),
-        frozenset(weak.split()),
-        tuple(without.split()),
-        frozenset(kinds.split()),
-    )
+def _role(also: str, **words: str) -> Role:
+    """A role by its fields as texts: names with commas, and words with blanks between them."""
+    names = frozenset(filter(None, also.split(",")))
+    return Role(names, **{field: frozenset(text.split()) for field, text in words.items()})
 
 
 _MOTION = (
@@ -65,16 +58,16 @@ _MOTION = (
 ROLES: Mapping[str, Role] = {
     "time": _role(
         "",
-        "t time xvalue",
-        "time timestamp elapsed zeit zeitstempel messzeit temps tempo tiempo tijd",
+        whole="t time xvalue",
+        words="time timestamp elapsed zeit zeitstempel messzeit temps tempo tiempo tijd",
         without="delay constant konstante",
         kinds="time",
     ),
     "W": _role(
         "load,normal load,normal force,normal stress",
-        "w fn ns n fz load sigma sigman signorm normalkraft normalspannung normallast auflast "
-        "auflagekraft anpresskraft σ σn",
-        "nor norm normal normale normala normalstress normalforce normalload normalkraft "
+        whole="w fn ns n fz load sigma sigman signorm normalkraft normalspannung normallast "
+        "auflast auflagekraft anpresskraft σ σn",
+        words="nor norm normal normale normala normalstress normalforce normalload normalkraft "
         "normalspannung normallast auflast sigman fn",
         weak="load loadcell pressure axialforce axialload axialstress last belastung charge carico "
         "carga",
@@ -83,10 +76,10 @@ ROLES: Mapping[str, Role] = {
     ),
     "F": _role(
         "force,shear,shear force,shear stress",
-        "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
-        "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
-        "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
-        "shear shr shearstress shearforce ft tangential tangentiel tangentielle tangenziale "
+        whole="f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft "
+        "scherkraft schubkraft schubspannung scherspannung tangentialkraft querkraft "
+        "forcedefrottement efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
+        words="shear shr shearstress shearforce ft tangential tangentiel tangentielle tangenziale "
         "tangencial lateral laterale traction tau τ reibkraft reibungskraft scherkraft schubkraft "
         "schubspannung scherspannung tangentialkraft cisaillement taglio cizalla cortante",
         weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
@@ -97,24 +90,24 @@ ROLES: Mapping[str, Role] = {
     ),
     "velocity": _role(
         "V,speed",
-        "v vel vlp speed sliprate",
-        "velocity vel speed geschwindigkeit gleitgeschwindigkeit vitesse velocita velocidad",
+        whole="v vel vlp speed sliprate",
+        words="velocity vel speed geschwindigkeit gleitgeschwindigkeit vitesse velocita velocidad",
         without="angular",
         kinds="velocity",
     ),
     "displacement": _role(
         "slip,position",
-        "x u d s slip lvdt weg gleitweg loadpoint lp lpd",
-        "disp displ displacement slip position stroke weg gleitweg verschiebung deplacement "
+        whole="x u d s slip lvdt weg gleitweg loadpoint lp lpd",
+        words="disp displ displacement slip position stroke weg gleitweg verschiebung deplacement "
         "spostamento desplazamiento",
         without="rate velocity vel speed geschwindigkeit",
         kinds="length",
     ),
     "friction": _role(
         "mu,friction coefficient",
-        "mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
+        whole="mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
         "reibkoeffizient",
-        "mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
+        words="mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
         "reibkoeffizient frottement attrito rozamiento friccion reibung",
         without="force stress load kraft forza fuerza spannung",
         kinds="dimensionless",

@@ -25,12 +25,6 @@ _LONGEST_UNIT = 60
 #: Exponents of the SI base units in alphabetic order, without zeros.
 Dimension = tuple[tuple[str, float], ...]
 
-#: Kinds in the order of search by dimension: several kinds may have the same dimension.
-_KINDS = (
-    "dimensionless", "force", "pressure", "length", "time", "velocity", "frequency", "stiffness",
-    "damping", "mass", "area", "viscosity", "temperature",
-)  # fmt: skip
-
 
 def normalised(unit: str) -> str:
     """The unit with ``u`` for each code point of micro, ``1/um`` for ``/um``, single blanks."""
@@ -161,7 +155,7 @@ def base_units(unit: str) -> tuple[float, Dimension]:
 
 def kind_of_dimension(dimension: Dimension) -> str | None:
     """Key of `asperity.units.KINDS` with this dimension; None if there is none."""
-    return next((kind for kind in _KINDS if base_units(KINDS[kind].si)[1] == dimension), None)
+    return next((k for k, spec in KINDS.items() if base_units(spec.si)[1] == dimension), None)
 
 
 def unit_text(dimension: Dimension) -> str:
