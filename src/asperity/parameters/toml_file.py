@@ -107,6 +107,12 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         f"more in {source}",
         "write fewer",
     )
+    large = InputError(
+        label,
+        "have integers of at most 64 bits",
+        f"a larger one in {source}",
+        "write it as a decimal number",
+    )
     if _LONG_KEY.search(text):
         raise deep
     try:
@@ -122,22 +128,13 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         raise deep from None
     except ValueError:
         # Python refuses integers of more than 4300 digits.
-        raise _too_large(label, source) from None
+        raise large from None
     level: list[Any] = [content]
     for _ in range(_DEEPEST):
         inner = [v for one in level for v in (one.values() if isinstance(one, Mapping) else one)]
         if any(isinstance(v, int) and v not in _INTEGERS for v in inner):
-            raise _too_large(label, source)
+            raise large
         level = [v for v in inner if isinstance(v, dict | list)]
     if level:
         raise deep
     return content
-
-
-def _too_large(label: str, source: str) -> InputError:
-    return InputError(
-        label,
-        "have integers of at most 64 bits",
-        f"a larger one in {source}",
-        "write it as a decimal number",
-    )

@@ -22,6 +22,9 @@ _PER_LENGTH = re.compile(r"\s*([-+.\deE]+)\s*(?:friction|mu|1)?\s*/\s*(.+?)\s*")
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
+#: Findings of a channel that do not hold for channels made from it.
+_OF_SOURCE = frozenset({"unknown unit", "unit overridden", "constant"})
+
 
 @typed
 def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
@@ -185,12 +188,7 @@ def _inherited(
     made = []
     for source in sources:
         for f in findings:
-            if not f.concerns(source) or f.name in (
-                *known,
-                "unknown unit",
-                "unit overridden",
-                "constant",
-            ):
+            if not f.concerns(source) or f.name in known | _OF_SOURCE:
                 continue
             sentence = f"'{target}' is made from '{source}': {f.sentence}"
             where = f"{target}{f.where.removeprefix(source)}"

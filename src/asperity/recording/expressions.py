@@ -167,29 +167,25 @@ class _Expression:
         """A number with its unit, and the position in the text after them."""
         number, text = float(token["number"]), token["unit"]
         if text is None:
-            unit = self._unit(token["behind"] or "")
-            return Quantity(np.float64(number * unit.values), unit.dimension), token.end()
+            return self._unit(token["behind"] or "", number), token.end()
         # "2 N/area" is 2 N divided by a channel: the longest valid unit belongs to the number.
         length = len(text)
         while length > 0:
             try:
-                factor, dimension = base_units(text[:length])
+                return _in_base_units(text[:length], number), token.start("unit") + length
             except InputError:
                 length = max(text.rfind(mark, 0, length) for mark in "*/·")
-                continue
-            return Quantity(np.float64(number * factor), dimension), token.start("unit") + length
         return self._unit(text), token.end()
 
-    def _unit(self, text: str) -> Quantity:
+    def _unit(self, text: str, number: float = 1.0) -> Quantity:
         try:
-            factor, dimension = base_units(text)
+            return _in_base_units(text, number)
         except InputError:
             self._fail(
                 "have units that are known",
                 f"'{text}' in '{self.text}'",
                 "write them like 'kN', 'cm^2' or 'N/V'",
             )
-        return Quantity(np.float64(factor), dimension)
 
     def _channel(self, name: str, only_channels: bool) -> Quantity:
         key = _key_of(self.trace, name)
@@ -201,8 +197,7 @@ class _Expression:
             if name.lower() == "time":
                 return Quantity(self.trace.time, _SECONDS)
             try:
-                factor, dimension = base_units(name)
-                return Quantity(np.float64(factor), dimension)
+                return _in_base_units(name, 1.0)
             except InputError:
                 known += [*_FUNCTIONS, *_STATISTICS]
         got, advice = f"'{name}' in '{self.text}'", closest(name, known)
@@ -282,6 +277,12 @@ class _Expression:
         return Quantity(value.values - level if name == "zero" else level, value.dimension)
 
 
+def _in_base_units(unit: str, values: Float | float) -> Quantity:
+    """Values in a unit of any dimension; raises `InputError` if the text is no unit."""
+    factor, dimension = base_units(unit)
+    return Quantity(values * np.float64(factor), dimension)
+
+
 def _product(*powers: tuple[Dimension, float]) -> Dimension:
     """Dimension of a product of powers."""
     exponents: dict[str, float] = {}
@@ -320,8 +321,7 @@ def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:
         # A column without a unit is dimensionless.
         return Quantity(channel.values, ())
     try:
-        factor, dimension = base_units(channel.recorded_unit)
+        return _in_base_units(channel.recorded_unit, channel.values)
     except InputError:
         rule, got = "be made of channels in known units", f"'{key}' in '{channel.recorded_unit}'"
         raise InputError(field, rule, got, f"name its unit when reading, like {key}=N") from None
-    return Quantity(channel.values * factor, dimension)

@@ -100,8 +100,9 @@ class Trace(Displayed):
     def __repr__(self) -> str:
         units = {n: c.unit if c.kind else c.recorded_unit for n, c in self.channels.items()}
         names = listed((f"{n} ({unit})" if unit else n for n, unit in units.items()), most=12)
-        counted = f"{len(self.findings)} finding{'s' * (len(self.findings) != 1)}"
-        return f"<Trace: {len(self)} samples of {names}; {counted}>"
+        return (
+            f"<Trace: {len(self)} samples of {names}; {count_text(len(self.findings), 'finding')}>"
+        )
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """Times, channels with their units, and findings."""

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from asperity.arrays import Float, Index
-from asperity.recording.finding import Finding, at_row
+from asperity.parameters.parameter import count_text
+from asperity.recording.finding import Finding, Severity, at_row
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -81,7 +82,7 @@ def check_sampling(time: Float) -> list[Finding]:
         longest = gap[np.argmax(missing)]
         row, lost = int(starts[longest]), float(missing.sum())
         text = (
-            f"{_counted(gap.size, 'gap')} in the recording, {lost:.4g} s missing in all; the "
+            f"{count_text(gap.size, 'gap')} in the recording, {lost:.4g} s missing in all; the "
             f"longest step, {steps[longest]:.4g} s, follows row {row}."
         )
         findings.append(Finding("gap", "warning", lost, at_row("time", row, time), text))
@@ -93,24 +94,22 @@ def check_sampling(time: Float) -> list[Finding]:
 
 def _backward_and_repeated(steps: Float, time: Float, rows: Index) -> list[Finding]:
     """Findings on the steps from row to row, of the times `time` in the rows `rows`."""
+
+    def finding(name: str, severity: Severity, count: int, step: int, text: str) -> Finding:
+        row = rows[step + 1]
+        where = f"time, row {row}, t = {time[step + 1]:.10g} s"
+        return Finding(name, severity, count, where, f"{text} row {row}.")
+
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
-        i = int(backward[np.argmin(steps[backward])])
-        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
-        text = (
-            f"Time runs backward {_counted(backward.size, 'time')}, the farthest by "
-            f"{-steps[i]:.4g} s at row {rows[i + 1]}."
-        )
-        findings.append(Finding("backward time", "error", backward.size, where, text))
+        i, times = int(backward[np.argmin(steps[backward])]), count_text(backward.size, "time")
+        text = f"Time runs backward {times}, the farthest by {-steps[i]:.4g} s at"
+        findings.append(finding("backward time", "error", backward.size, i, text))
     if repeated.size:
-        i = int(repeated[0])
-        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
-        text = (
-            f"{_counted(repeated.size, 'time stamp')} the same as the one before, the first in "
-            f"row {rows[i + 1]}."
-        )
-        findings.append(Finding("repeated time", "warning", repeated.size, where, text))
+        stamps = count_text(repeated.size, "time stamp")
+        text = f"{stamps} the same as the one before, the first in"
+        findings.append(finding("repeated time", "warning", repeated.size, int(repeated[0]), text))
     return findings
 
 
@@ -195,10 +194,6 @@ def _rounded(grid: RoundedGrid) -> Finding:
 def _are_even(steps: Float) -> bool:
     median = float(np.median(steps))
     return bool(steps.max() - median <= _EVEN * median >= median - steps.min())
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 #: Smallest mean number of samples between gaps.

@@ -33,7 +33,7 @@ from asperity.recording.roles import (
     recorded_as,
     role_of,
 )
-from asperity.recording.trace import Channel, Trace, check
+from asperity.recording.trace import Channel, Trace, checked
 
 if TYPE_CHECKING:
     from asperity.recording.readers.raw import RawRecording
@@ -98,8 +98,7 @@ def assemble(
     findings = _folded(findings + _unknown(channels))
     provenance = {"file": known_as(path).name, **recorded.provenance, "time": clock.source}
     roles = {role: name for role, name in roles.items() if role != "time"}
-    trace = Trace(clock.time, channels, (), provenance, roles)
-    return Trace(clock.time, channels, (*findings, *check(trace)), provenance, roles)
+    return checked(Trace(clock.time, channels, tuple(findings), provenance, roles))
 
 
 def _unique(names: list[str], findings: list[Finding]) -> list[str]:

@@ -85,14 +85,13 @@ def read(path: Path) -> RawRecording:
     if not pairs:
         raise unusable(path, "which has another number of values than its LOOK header says")
     scores = [_plausibility(raw, *pair) for pair in pairs]
-    best = int(np.argmax(scores))
-    header, dtype = pairs[best]
-    unambiguous = all(scores[best] - s > 0.05 for i, s in enumerate(scores) if i != best)
+    header, dtype = pairs[int(np.argmax(scores))]
+    ambiguous = sum(max(scores) - score <= 0.05 for score in scores) > 1
     # A damaged file may hold signalling NaN.
     with np.errstate(all="ignore"):
         data = raw[header.size :].view(dtype).astype(np.float64)
     columns, findings = _columns(header, data)
-    if not unambiguous:
+    if ambiguous:
         text = f"The numbers were read as {dtype}, but another format makes as much sense."
         findings.append(Finding("byte order", "warning", np.dtype(dtype).itemsize, "data", text))
     columns, counted = _in_seconds(columns, header.dtime)
@@ -152,12 +151,8 @@ def _plausibility(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> flo
     Half of a float64 is no plausible float32 and makes a rough column; two float32 in one float64
     make a column run on into the next.
     """
-    item = np.dtype(dtype).itemsize
-    body = raw[header.size : header.size + raw.size // item * item]
     with np.errstate(all="ignore"):
-        data = body[: body.size // item * item].view(dtype)[:_SAMPLE].astype(np.float64)
-        if not data.size:
-            return 0.0
+        data = raw[header.size :].view(dtype)[:_SAMPLE].astype(np.float64)
         size = np.abs(data)
         plausible = np.isfinite(data) & (size > _SMALLEST) & (size < _LARGEST)
         zeros = float((data == 0).mean())

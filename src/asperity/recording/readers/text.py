@@ -230,6 +230,8 @@ def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, lis
 
     options: dict[str, Any] = {
         "header": None,
+        # Surplus cells of the first row are no row labels, which would shift all columns.
+        "index_col": False,
         "names": list(range(layout.width + layout.closed)),
         "decimal": layout.decimal,
         "na_values": list(MISSING),
@@ -242,18 +244,12 @@ def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, lis
         "thousands": {".": ",", ",": "."}[layout.decimal] if layout.grouped else None,
     }
 
-    def rows() -> BinaryIO:
-        """The file from its first row; a copy of its rows where bytes behind them do not count."""
+    def parsed(**more: Any) -> pd.DataFrame:
         end = file.seek(0, io.SEEK_END)
         file.seek(layout.start)
-        return file if stop == end else io.BytesIO(file.read(stop - layout.start))
-
-    def parsed(**more: Any) -> pd.DataFrame:
-        frame = pd.read_csv(rows(), **options, **more)
-        if isinstance(frame.index, pd.RangeIndex):
-            return frame
-        # pandas took surplus cells of the first row for row labels, which shifts all columns.
-        return pd.read_csv(rows(), index_col=False, **options, **more)
+        # A copy of the rows where bytes behind them do not count.
+        rows = file if stop == end else io.BytesIO(file.read(stop - layout.start))
+        return pd.read_csv(rows, **options, **more)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -359,9 +355,7 @@ def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, l
     texts = [i for i, kind in enumerate(frame.dtypes) if i < width and kind.kind not in "iuf"]
     if not texts:
         return frame, []
-    numbers = frame[list(range(width))].copy()
-    for i in texts:
-        numbers[i] = pd.to_numeric(frame[i], errors="coerce")
+    numbers = frame[list(range(width))].apply(pd.to_numeric, errors="coerce")
     if any(2 * numbers[i].notna().sum() < frame[i].notna().sum() for i in texts):
         return frame, []
     words = (frame[texts].notna().any(axis=1) & numbers.isna().all(axis=1)).to_numpy()
