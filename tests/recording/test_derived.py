@@ -69,6 +69,12 @@ def test_expressions_give_the_numbers_and_units_of_their_formula(rig, text):
     assert derived.provenance["derived channels"] == {"new": text}
 
 
+def test_a_channel_with_the_name_of_a_unit_is_the_channel():
+    volts = np.linspace(1, 2, 50)
+    trace = Trace(TIME, {"G": Channel(volts, None, "", "G", "V")})
+    assert np.allclose(values(derive(trace, {"force": "2 N/V*G"}), "force"), 2 * volts)
+
+
 def test_an_expression_may_be_a_long_sum(rig):
     derived = derive(rig, {"new": "+".join(["slip"] * 390)})
     assert np.allclose(values(derived, "new"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)

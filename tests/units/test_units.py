@@ -14,6 +14,7 @@ from hypothesis import given, strategies as st
 
 from asperity.errors import InputError
 from asperity.units import KINDS, format_si, from_si, to_radians, to_si
+from asperity.units.scale import base_units, kind_of_dimension
 
 RUNGS = [(kind, unit, power) for kind, k in KINDS.items() for unit, power in k.ladder]
 finite = st.floats(min_value=1e-200, max_value=1e200)
@@ -316,3 +317,8 @@ def test_a_number_with_too_few_digits_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="lie within the range of double precision"):
         to_si(text, "length", "slider.x")
     assert to_si("2.3e-308 m", "length", "slider.x") == 2.3e-308
+
+
+def test_each_kind_has_a_dimension_of_its_own() -> None:
+    for name, kind in KINDS.items():
+        assert kind_of_dimension(base_units(kind.si)[1]) == name

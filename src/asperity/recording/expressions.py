@@ -168,8 +168,11 @@ class _Expression:
         number, text = float(token["number"]), token["unit"]
         if text is None:
             return self._unit(token["behind"] or "", number), token.end()
+        # "2 N/V*G" is 2 N/V times the channel G, also where G is the name of a unit.
+        names = {*self.trace.channels, *(c.recorded_name for c in self.trace.channels.values())}
+        factors = (m.start() for m in re.finditer(r"[*·]([^*/·]+)", text) if m[1] in names)
         # "2 N/area" is 2 N divided by a channel: the longest valid unit belongs to the number.
-        length = len(text)
+        length = next(factors, len(text))
         while length > 0:
             try:
                 return _in_base_units(text[:length], number), token.start("unit") + length

@@ -186,6 +186,23 @@ def test_missing_cells_and_words_among_numbers_are_named(written, planted):
     assert np.array_equal(np.flatnonzero(np.isnan(trace.channel("W").values)), [7, 9, 11])
 
 
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ("0,007;overload;2,8", ["text in numbers", "missing values"]),
+        ("0,007;1.234,5;2,8", ["text in numbers", "missing values"]),
+        ("0,007;1.234;2,8", ["text in numbers", "missing values"]),
+        ("end of part one;;", ["text row", "gap"]),
+    ],
+)
+def test_words_among_numbers_with_decimal_commas_are_named(written, planted, row, expected):
+    lines = table(planted, ";", ",").splitlines()
+    lines[7] = row
+    trace = read(written("time_s;W_N;F_N\n" + "\n".join(lines) + "\n"))
+    assert names(trace) == expected
+    assert np.array_equal(trace.channel("W").values[:7], planted.W[:7])
+
+
 def test_rows_with_too_many_cells_are_named(written, planted):
     lines = table(planted).splitlines()
     lines[5] += ",9"

@@ -52,6 +52,8 @@ LARGEST = 1 << 30
 _TAIL = 1 << 16
 #: Number of rows that must agree before a last line without line end is accepted.
 _ENOUGH = 5
+#: Exchanges decimal commas and points: what has the other mark is no number.
+_MARKS = str.maketrans(",.", ".,")
 #: Characters of a row of words shown in its finding.
 _SHOWN = 60
 
@@ -157,11 +159,11 @@ def _load(
     frame, findings = _parse(file, layout, ending.stop)
     if not len(frame):
         raise unusable(path, "which has a heading only", "hold rows of numbers", "give a recording")
-    frame, left_out = _without_text_rows(frame, layout.width)
+    frame, left_out = _without_text_rows(frame, layout.width, layout.decimal)
     findings += left_out
     columns = []
     for i, name in enumerate(layout.headings.names):
-        values, texts = _numbers_of(frame[i], name or f"column {i}")
+        values, texts = _numbers_of(frame[i], layout.decimal, name or f"column {i}")
         unit = layout.headings.units[i] if layout.headings.units else None
         columns.append(RawColumn(name, values, unit))
         findings += texts
@@ -341,7 +343,18 @@ def _is_whole(cells: list[str], layout: Layout) -> bool | None:
     return usual == {last}
 
 
-def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, list[Finding]]:
+def _as_numbers(column: pd.Series[Any], decimal: str) -> pd.Series[Any]:
+    """A column as numbers, NaN where a cell holds none."""
+    import pandas as pd
+
+    if decimal == ",":
+        column = column.map(lambda cell: cell.translate(_MARKS) if isinstance(cell, str) else cell)
+    return pd.to_numeric(column, errors="coerce")
+
+
+def _without_text_rows(
+    frame: pd.DataFrame, width: int, decimal: str
+) -> tuple[pd.DataFrame, list[Finding]]:
     """A table of numbers without rows of words, such as headings between parts and remarks.
 
     Parameters
@@ -349,13 +362,13 @@ def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, l
     frame : DataFrame
         Columns 0 to `width` - 1; one that holds words only, such as dates, leaves all rows.
     width : int
+    decimal : str
+        Decimal mark of numbers in text.
     """
-    import pandas as pd
-
     texts = [i for i, kind in enumerate(frame.dtypes) if i < width and kind.kind not in "iuf"]
     if not texts:
         return frame, []
-    numbers = frame[list(range(width))].apply(pd.to_numeric, errors="coerce")
+    numbers = frame[list(range(width))].apply(_as_numbers, decimal=decimal)
     if any(2 * numbers[i].notna().sum() < frame[i].notna().sum() for i in texts):
         return frame, []
     words = (frame[texts].notna().any(axis=1) & numbers.isna().all(axis=1)).to_numpy()
@@ -372,13 +385,13 @@ def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, l
     return frame[~words].reset_index(drop=True), [left_out]
 
 
-def _numbers_of(column: pd.Series[Any], name: str) -> tuple[np.ndarray[Any, Any], list[Finding]]:
+def _numbers_of(
+    column: pd.Series[Any], decimal: str, name: str
+) -> tuple[np.ndarray[Any, Any], list[Finding]]:
     """Numbers of a column, with NaN for single texts; a column of texts is returned unchanged."""
     if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=np.float64), []
-    import pandas as pd
-
-    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    numbers = _as_numbers(column, decimal).to_numpy(dtype=np.float64)
     texts = np.flatnonzero(np.isnan(numbers) & column.notna().to_numpy())
     if 2 * texts.size > numbers.size:
         return column.to_numpy(dtype=object), []
