@@ -76,7 +76,7 @@ def in_files(argument: Argument) -> str:
     """An argument as a TOML file writes it: ``fixed.D0``, ``fixed.D0 = '0.4 um'``."""
     place = ".".join(filter(None, argument[:2]))
     value = {"True": "true", "False": "false"}.get(argument.value, argument.value)
-    plain = value in ("true", "false") or value.isdigit()
+    plain = value in ("true", "false") or value.replace(".", "", 1).isdigit()
     return f"{place} = {value if plain else repr(value)}" if value else place
 
 

@@ -14,7 +14,12 @@ from asperity.laws import get_law, registered
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme
 from asperity.loads.programme.steps import LoadAndVelocity
-from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    point_numbers,
+    refuse_foreign,
+)
 from asperity.parameters import MACHINE, known_name, law_parameters
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
@@ -102,10 +107,10 @@ class Protocol(Experiment):
         counted, rule = self.solver.inertia or "M" not in self.parameters, "go with inertia"
         require(counted, "parameters.M", rule, "solver.inertia = false", advice)
         with keys_of_file(FIELDS):
-            numbers = point_numbers(self, "protocol", among, needed)
+            refuse_foreign(self.law, self.parameters)
             for name in self.parameters:
                 known_name(name, among, Argument("numbers", key=name))
-        return numbers
+            return point_numbers(self, "protocol", among, needed)
 
     def _level(self) -> LoadAndVelocity:
         load = self._numbers["W0"].value if self.start.load is None else self.start.load

@@ -240,10 +240,8 @@ def _names_of_another_width(
     units: list[str] | None = None
     if len(rows) > 1 and len(rows[-1]) == len(rows[-2]) and _are_units(rows[-1], rows[-2]):
         units = rows.pop()
-    if not rows or len(rows[-1]) < 2 or _names_nothing(rows[-1]):
-        return Headings([""] * width, None)
-    names = _bare(rows[-1])
-    if _quantities(names) < 2 or len(names) == width:
+    names = _bare(rows[-1]) if rows else []
+    if len(names) in (0, 1, width) or _names_nothing(names) or _quantities(names) < 2:
         return Headings([""] * width, None)
     missing = [""] * max(0, width - len(names))
     return Headings(
