@@ -14,11 +14,11 @@ from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import free_name, kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace, check, checked
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS
 from asperity.units.scale import kind_of_dimension, unit_text
 
-#: A number of friction over a length.
-_PER_LENGTH = re.compile(r"\s*([-+.\deE]+)\s*(?:friction|mu|1)?\s*/\s*(.+?)\s*")
+#: The word before the length of a friction per length.
+_FRICTION = re.compile(r"(?:friction|mu)(?=\s*/)")
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
@@ -120,19 +120,12 @@ def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
     InputError
         If one of the two is not understood or not positive.
     """
-    field, per_length = "stiffness_from_friction", stiffness
-    if isinstance(stiffness, str):
-        match = _PER_LENGTH.fullmatch(stiffness)
-        if match is None:
-            rule, advice = "be a friction per length", "write it like '1e-3 /um'"
-            raise InputError(f"{field}.stiffness", rule, f"'{stiffness}'", advice)
-        per_length = to_si(match[1], "dimensionless", f"{field}.stiffness")
-        per_length /= to_si(f"1 {match[2]}", "length", f"{field}.stiffness")
+    field = "stiffness_from_friction"
+    text = _FRICTION.sub("", stiffness) if isinstance(stiffness, str) else stiffness
+    per_length = number(text, f"{field}.stiffness", "per_length", "positive")
     stress = isinstance(load, str) and load.rstrip().endswith(("Pa", "bar"))
-    weight = to_si(load, "pressure" if stress else "force", f"{field}.load")
-    holds, rule = float(per_length) > 0 and weight > 0, "have a positive stiffness and load"
-    require(holds, field, rule, f"{stiffness} and {load}", "check the signs")
-    return float(per_length) * weight
+    kind = "pressure" if stress else "force"
+    return per_length * number(load, f"{field}.load", kind, "positive")
 
 
 def _with_channel(
