@@ -311,7 +311,7 @@ def _key_of(trace: Trace, name: str) -> str | None:
         channel = trace.channel(name)
     except InputError:
         # V, N, W and F are units where no channel has the role of this name.
-        if any(name in unit for unit in ("V", "N", "W", "F")):
+        if name in ("V", "N", "W", "F"):
             return None
         raise
     return trace.name_of(channel)

@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.errors import InputError, InputTypeError, printable
 from asperity.units.kinds import KINDS, Kind, kind_of, require_text, shown
-from asperity.units.scale import EXACT, normalised, unit_factor
+from asperity.units.scale import EXACT, normalised, scaled, unit_factor
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
 #: Larger powers of ten overflow a double in any unit.
@@ -99,10 +99,7 @@ def from_si(value: Any, unit: str, kind: str) -> Any:
         if array.dtype.kind not in "iuf":
             raise InputTypeError("value", "be a number or an array of them", shown(value))
         value = value if hasattr(value, "dtype") else array
-    # One rounding instead of two: 10^-n is inexact in binary, 10^n is not.
-    if factor < 1:
-        return value * float(EXACT.divide(Decimal(1), factor))
-    return value / float(factor)
+    return scaled(value, EXACT.divide(Decimal(1), factor))
 
 
 def format_si(value: float, kind: str, digits: int = 4) -> str:

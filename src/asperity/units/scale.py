@@ -119,6 +119,13 @@ def _registry() -> Any:
     return pint.UnitRegistry(non_int_type=Decimal)
 
 
+def scaled(values: Any, factor: Decimal) -> Any:
+    """Values times a factor, rounded once: 10^-n is inexact in binary, 10^n is not."""
+    if abs(factor) < 1:
+        return values / float(EXACT.divide(Decimal(1), factor))
+    return values * float(factor)
+
+
 def dimension_of(exponents: Mapping[str, float]) -> Dimension:
     """The dimension with these exponents."""
     return tuple(sorted((name, float(n)) for name, n in exponents.items() if n))

@@ -20,7 +20,7 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, printable
 from asperity.recording.roles import ROLES, candidates
 from asperity.units import KINDS
-from asperity.units.scale import normalised, unit_factor
+from asperity.units.scale import normalised, scaled, unit_factor
 
 #: Words for units, lower case, as the unit they stand for.
 _WORDS = {
@@ -182,10 +182,7 @@ def in_si(values: NDArray[Any], unit: Unit | None) -> Float:
         return values
     # Overflow in a damaged file gives infinity, which the checks report.
     with np.errstate(over="ignore"):
-        # 10^-n is inexact in binary, 10^n is not.
-        if abs(unit.factor) < 1:
-            return values / float(Decimal(1) / unit.factor)
-        return values * float(unit.factor)
+        return np.asarray(scaled(values, unit.factor))
 
 
 def split_labels(labels: Sequence[str]) -> list[tuple[str, str]]:
