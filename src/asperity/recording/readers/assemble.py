@@ -91,8 +91,13 @@ def assemble(
         unit = known.get(name)
         numbers, missing = without_codes(column.values, name)
         findings += missing
-        about = (unit.kind, unit.si) if unit else (None, "")
-        channels[name] = Channel(in_si(numbers, unit), *about, column.label, texts[name])
+        channels[name] = Channel(
+            in_si(numbers, unit),
+            unit.kind if unit else None,
+            unit.si if unit else "",
+            column.label,
+            texts[name],
+        )
     if dropped:
         findings.append(_left_out(dropped))
     findings = _folded(findings + _unknown(channels))

@@ -202,7 +202,10 @@ def group_of(
     )
     columns: list[RawColumn] = []
     numbers = {k: v for k, v in arrays.items() if np.size(v) == 1}
-    steps = [(interval_of(numbers), None), (interval_of(of_group or {}), None)]
+    steps: list[tuple[float | None, int | None]] = [
+        (interval_of(numbers), None),
+        (interval_of(of_group or {}), None),
+    ]
     for name, values in arrays.items():
         if isinstance(values, Mapping) or name in texts:
             continue
