@@ -274,6 +274,13 @@ def test_a_sampled_period_is_the_modulation_it_was_sampled_from():
     assert read.amplitude == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("count", [3, 4, 9, 64])
+def test_a_sampled_period_has_its_samples(count):
+    load = np.random.default_rng(count).uniform(0.8, 1.2, count)
+    w = sampled(load).at(np.arange(count) * 2 * np.pi / count).w
+    np.testing.assert_allclose(w, load / load.mean(), rtol=1e-12)
+
+
 @pytest.mark.parametrize("count", [1, 8, 9, 300])
 def test_a_sum_of_few_and_of_many_harmonics_is_the_sum_of_its_terms(count):
     theta, k = np.linspace(0, 7, 50)[:, None], np.arange(1, count + 1)

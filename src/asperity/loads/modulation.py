@@ -276,7 +276,7 @@ def sampled(
     """Modulation from evenly spaced samples of one period, the first at theta = 0.
 
     Between the samples the signal is their trigonometric interpolation, as exact as the samples
-    are for a signal without harmonics beyond half their number.
+    are for a signal with harmonics below half their number only.
 
     Parameters
     ----------
@@ -339,6 +339,9 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
     rule, got = "be at least 3 finite samples of one period", f"an array of shape {samples.shape}"
     require(holds, name, rule, got, "give evenly spaced samples without the end point")
     spectrum = np.fft.rfft(samples) / len(samples)
+    if len(samples) % 2 == 0:
+        # Half of it is of the negative frequency; of the sine, which is zero at the samples, none.
+        spectrum[-1] /= 2
     mean = scale = spectrum[0].real
     if name == "shear":
         scale, rule = 1.0, "have a mean of zero"
@@ -347,8 +350,7 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
     else:
         rule, advice = "have a positive mean", "give it in the sense of sliding"
         require(mean > 0, name, rule, f"{mean:g}", advice)
-    # At half the number of samples, cos and sin cannot be distinguished.
-    top = (len(samples) - 1) // 2
+    top = len(samples) // 2
     kept = spectrum[1 : min(top, harmonics or top) + 1] / scale
     size = np.abs(kept).max(initial=0.0)
     kept = kept[: np.flatnonzero(np.abs(kept) > _NEGLIGIBLE * size).max(initial=-1) + 1]
