@@ -597,3 +597,12 @@ def log_density(data: Residuals) -> float:
     """Logarithm of the normal density of the data of a term."""
     n = data.values.size
     return -0.5 * (float(np.sum(data.values**2)) + n * math.log(2 * math.pi)) - data.log_scale
+
+
+def aicc_penalty(parameters: int, data: float) -> float:
+    """The term that AICc adds to the deviance; infinite if there are too few data."""
+    if not parameters:
+        return 0.0
+    if data <= parameters + 1:
+        return math.inf
+    return 2 * parameters + 2 * parameters * (parameters + 1) / (data - parameters - 1)

@@ -274,6 +274,22 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     assert bare.evidence.log == bare.fit.log_likelihood
 
 
+def test_a_law_with_too_few_data_for_its_aicc_is_not_compared(made, pmma):
+    # Four data and three parameters: AICc has no value, whatever chi-squared says.
+    table = made("elasto-plastic", 1).without(~np.isin(np.arange(V.size), [1, 6]))
+    few = {n: table.values[n] for n in ("delta_mu", "mu1")}
+    table = replace(table, values=few, errors={n: table.errors[n] for n in few})
+    given = {"material": pmma, "fixed": {"eps_ratio": 0.48}, "starts": 8}
+    with pytest.raises(InputError, match="got 1; elasto-plastic must have more data for its AICc"):
+        compare(table, ("rice-ruina", "elasto-plastic"), ("A", "B", "lambda"), **given)
+    comparison = compare(
+        table, ("rice-ruina", "ruina-slip", "elasto-plastic"), ("A", "B", "lambda"), **given
+    )
+    assert list(comparison.not_compared) == ["elasto-plastic"]
+    assert not comparison.decided
+    assert "because there are too few data" in comparison.verdict
+
+
 def spoiled_table(made, seed, *, outliers):
     """A table of 8 to 16 rows of a random law, with errors of 8 to 60 standard errors in rows."""
     random = np.random.default_rng([17, seed])

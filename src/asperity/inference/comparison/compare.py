@@ -199,7 +199,8 @@ def compare(
     Raises
     ------
     InputError
-        As `fit`; if fewer than two laws are given, or no law has one of the free parameters.
+        As `fit`; if fewer than two laws are given, or no law has one of the free parameters; if
+        fewer than two laws can be fitted, and have two data more than free parameters.
 
     Notes
     -----
@@ -272,7 +273,9 @@ def compare(
                 "progress": lambda done, total, k=k: report(k + done / total),
             }
             try:
-                done[name] = fit(data, name, names, **internal, **{**options, **mine})
+                result = fit(data, name, names, **internal, **{**options, **mine})
+                _require_aicc(result)
+                done[name] = result
             except UnfittableLawError as error:
                 not_compared[name] = str(error)
             report(k + 1)
@@ -297,13 +300,27 @@ def compare(
     # The table has the reason for each law.
     lacking = (
         f" Not compared: {enumerated(list(not_compared))}, because a number is neither free nor "
-        "given, or because there are too few samples."
+        "given, or because there are too few data."
     ) * bool(not_compared)
     judgement = doubt + result.judgement + stretches + _with_free_stiffness(result) + lacking
     result = replace(result, not_compared=not_compared, judgement=judgement)
     return (
         _with_evidence(result, lambda laws: report(len(free_by_law) + laws)) if evidence else result
     )
+
+
+def _require_aicc(fit: Fit) -> None:
+    """Refuse a fit with too few data for its AICc, by which laws are compared.
+
+    Raises
+    ------
+    UnfittableLawError
+    """
+    if math.isinf(fit.aicc):
+        count = sum(residuals.values.size for residuals in fit.residuals)
+        rule, got = "have more data for its AICc", f"{count} for {symbols(fit.parameters)}"
+        advice = "give two data more than free parameters"
+        raise UnfittableLawError(fit.law, rule, got, advice)
 
 
 def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:

@@ -29,7 +29,6 @@ from asperity.inference.design.candidates import (
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
 from asperity.inference.design.rival import (
     RivalFit,
-    penalty,
     probability_of_deciding,
     reached,
     separation,
@@ -45,7 +44,7 @@ from asperity.inference.design.shares import (
 )
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.fitting.result import Warned
-from asperity.inference.objective import Minimum, Objective
+from asperity.inference.objective import Minimum, Objective, aicc_penalty
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
@@ -616,8 +615,9 @@ class _Task:
                 continue
             estimates.append(list(truth.named(end.u).values()))
             if other is not None:
-                more = penalty(len(nearest), data) - penalty(len(u), data)
-                behind.append(other.chi2 - end.chi2 + more)
+                of_rival, of_law = aicc_penalty(len(nearest), data), aicc_penalty(len(u), data)
+                together = math.isfinite(of_rival + of_law)
+                behind.append(other.chi2 - end.chi2 + of_rival - of_law if together else 0.0)
         columns = np.array(estimates).reshape(-1, len(u)).T
         spreads = {
             name: _spread(column, random) for name, column in zip(truth.names, columns, strict=True)

@@ -21,7 +21,7 @@ from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import differences, predicted, with_readings
 from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
-from asperity.inference.objective import Minimum, Objective
+from asperity.inference.objective import Minimum, Objective, aicc_penalty
 from asperity.inference.tables.table import LockInTable
 
 _ROUNDS = 15
@@ -203,17 +203,10 @@ def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, see
     noise = np.random.default_rng(seed).normal(size=(_DRAWS, apart.size))
     noise[:, apart.size - q :] = 0.0
     difference = _outside(rival_columns, apart - noise) - _outside(law_columns, noise)
-    behind = (
-        difference + penalty(rival_columns.shape[1], data) - penalty(law_columns.shape[1], data)
-    )
-    return float((behind >= EXCLUDED).mean())
-
-
-def penalty(parameters: int, data: float) -> float:
-    """The term that AICc adds to the deviance; infinite if there are too few data."""
-    if data <= parameters + 1:
-        return np.inf
-    return 2 * parameters + 2 * parameters * (parameters + 1) / (data - parameters - 1)
+    of_rival, of_law = (aicc_penalty(a.shape[1], data) for a in (rival_columns, law_columns))
+    # Laws with as many parameters as data, or one less, are not compared.
+    together = math.isfinite(of_rival + of_law)
+    return float((difference + of_rival - of_law >= EXCLUDED).mean()) if together else 0.0
 
 
 def _outside(jacobian: Float, vectors: Float) -> Float:

@@ -26,7 +26,13 @@ from asperity.inference.fitting.intervals import (
 from asperity.inference.fitting.minima import FAR_OFF, RIVAL
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.holds import HoldTerm
-from asperity.inference.objective import Minimum, Objective, Residuals, log_density
+from asperity.inference.objective import (
+    Minimum,
+    Objective,
+    Residuals,
+    aicc_penalty,
+    log_density,
+)
 from asperity.inference.tables.residuals import (
     DESCRIBED,
     outlying_rows,
@@ -277,7 +283,7 @@ def _fit_with(
         dof=at.dof,
         p_value=at.p_value,
         log_likelihood=-deviance / 2,
-        aicc=deviance + 2 * k + (2 * k * (k + 1) / (n - k - 1) if n > k + 1 else math.inf),
+        aicc=deviance + aicc_penalty(k, n),
         bic=deviance + k * math.log(n),
         observables=_observables(at.data),
         residuals=at.data,
