@@ -311,9 +311,7 @@ class CycleTerm(DataTerm):
         # Measured means are of lines between samples: this adds h^2/12 times the curvature.
         return np.asarray((before + 10 * at + after) / 12)
 
-    def residuals(
-        self, values: Mapping[str, float], *, search: bool | None = None
-    ) -> Residuals | None:
+    def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Residuals in standard uncertainties; None where the law has no cycle.
 
         The Jacobian neglects the change of level and shift with the parameters (Kaufman, BIT 15,

@@ -258,9 +258,7 @@ class HoldTerm(DataTerm):
         self.error *= max(math.sqrt(float(np.sum(residuals.values**2)) / freedom), 1e-12)
         self._freedom = float(freedom)
 
-    def residuals(
-        self, values: Mapping[str, float], *, search: bool | None = None
-    ) -> Residuals | None:
+    def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Residuals in standard uncertainties; None where a hold has no solution."""
         names = tuple(n for n in values if n in law_parameters(self.law))
         table, rows = self.table, self.table.rows

@@ -117,9 +117,7 @@ class DataTerm(ABC):
         return 0
 
     @abstractmethod
-    def residuals(
-        self, values: Mapping[str, float], *, search: bool | None = None
-    ) -> Residuals | None:
+    def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Whitened residuals; None where the law has no solution.
 
         Parameters
@@ -127,8 +125,6 @@ class DataTerm(ABC):
         values : mapping of str to float
             All free parameters and nuisances of the fit, in SI. The columns of the Jacobian are the
             derivatives with respect to these, in this order; zeros without dependence.
-        search : bool, optional
-            Whether to try a slower method if the fast method has no solution.
         """
 
     def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
@@ -339,13 +335,13 @@ class Objective:
         low, high = self.bounds
         return result if ((result >= low) & (result <= high)).all() else u
 
-    def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
+    def data_residuals(self, u: Float) -> list[Residuals] | None:
         """Residuals of each term, with derivatives in the coordinates; None without a solution."""
         values = self.named(u)
         slopes = np.array([k.slope(values[k.name]) for k in self.unknowns])
         result = []
         for term in self.terms:
-            residuals = term.residuals(values, search=search)
+            residuals = term.residuals(values)
             if residuals is None:
                 return None
             result.append(residuals._replace(jacobian=residuals.jacobian * slopes))

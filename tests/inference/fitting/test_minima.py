@@ -60,7 +60,7 @@ class Formula(LockInTerm):
     def weighted(self, weights):
         return Weighted(self, weights)
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         x = math.log(values["D0"])
         if x > self.edge and not self.searching:
             return None
@@ -77,8 +77,8 @@ class Weighted(Formula):
     def __init__(self, term, weights):
         self.term, self.factors = term, weights
 
-    def residuals(self, values, *, search=None):
-        residuals = self.term.residuals(values, search=search)
+    def residuals(self, values):
+        residuals = self.term.residuals(values)
         if residuals is None:
             return None
         w = self.factors[residuals.row]
@@ -239,7 +239,7 @@ def test_a_profile_continues_where_the_fast_method_ends():
 class Ending(Formula):
     """Residuals without an orbit above `edge`, whatever the method."""
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         return None if math.log(values["D0"]) > self.edge else super().residuals(values)
 
 
@@ -289,7 +289,7 @@ class TwoNoises(RunTerm):
         share, slope = math.sin(rate * (x - FIRST)) ** 2, rate * math.sin(2 * rate * (x - FIRST))
         return np.array([1 + 9 * share, 2 - share]), np.array([9 * slope, -slope])
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         r, slope = (np.repeat(v / self.sizes, self.half) for v in self._raw(math.log(values["D0"])))
         scale = self.half * float(np.log(self.sizes).sum())
         names, rows = np.full(r.size, "friction"), np.arange(r.size)
@@ -374,7 +374,7 @@ class PartlySolved(Formula):
         super().__init__(values)
         self.border, self.wrong, self.unsolved = border, wrong, unsolved
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         result, x = super().residuals(values), math.log(values["D0"])
         if x > self.border:
             return result
@@ -424,7 +424,7 @@ class Edge(Formula):
         super().__init__(values)
         self.searching, self.step, self.last = True, step, (math.nan, math.nan)
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         x, y = math.log(values["D0"]), math.log(values["A"])
         change = abs(x - self.last[0]), abs(y - self.last[1])
         if min(change) == 0 and max(change) > self.step:
@@ -520,7 +520,7 @@ class Rows(Formula):
         part.searching = True
         return part
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         if not self.searching:
             return None
         r, slope = (v[self.kept] for v in self.values(math.log(values["D0"])))
@@ -580,11 +580,11 @@ class NarrowRows(Rows):
         part.searching = True
         return part
 
-    def residuals(self, values, *, search=None):
+    def residuals(self, values):
         near = abs(math.log(values["D0"]) - FIRST) < 0.05
         if self.lonely in self.kept and not near:
             return None
-        return super().residuals(values, search=search)
+        return super().residuals(values)
 
 
 def test_fits_of_simpler_laws_are_starts():

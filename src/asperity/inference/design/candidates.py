@@ -213,7 +213,7 @@ def predicted(
     for start in range(0, total, _BLOCK):
         block = some_of(points, slice(start, start + _BLOCK))
         table = LockInTable(plan.name, block, {}, {})
-        parts.append(_term(plan, hypothesis, table).predicted(values, search=True))
+        parts.append(_term(plan, hypothesis, table).predicted(values))
         progress(min(start + _BLOCK, total), total)
     columns = [
         [np.concatenate(column) for column in zip(*some, strict=True)]
@@ -231,7 +231,9 @@ def predicted(
 
 def _term(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> LockInTerm:
     fixed = {**hypothesis.fixed, **table.points}
-    return LockInTerm(table, hypothesis.law, fixed, **plan.motion)
+    term = LockInTerm(table, hypothesis.law, fixed, **plan.motion)
+    term.use_search(True)
+    return term
 
 
 def expected_readings(
@@ -282,6 +284,5 @@ def with_readings(
     plan: DesignPlan, hypothesis: Objective, readings: LockInTable, counts: Float
 ) -> Objective:
     """The hypothesis with readings to be fitted; each is the mean of several, shape (rows,)."""
-    term = _term(plan, hypothesis, readings)
-    term.use_search(True)
-    return replace(hypothesis, terms=(term.weighted(np.sqrt(counts)),))
+    term = _term(plan, hypothesis, readings).weighted(np.sqrt(counts))
+    return replace(hypothesis, terms=(term,))

@@ -202,7 +202,8 @@ def shift_of_estimates(
     for change in (high, low):
         fixed = {**fit.objective.fixed, **change}
         changed = LockInTerm(term.table, fit.objective.law, fixed, **term.motion)
-        residuals = changed.residuals(fit.values, search=True)
+        changed.use_search(True)
+        residuals = changed.residuals(fit.values)
         if residuals is None:
             return dict.fromkeys(fit.values, math.inf)
         sides.append(residuals)

@@ -193,9 +193,7 @@ class RunTerm(DataTerm):
         """As in `DataTerm`: allow the motion the largest number of steps from now on."""
         self._room[:] = [max(MOST_STEPS, *self._room)] if always else self._room
 
-    def residuals(
-        self, values: Mapping[str, float], *, search: bool | None = None
-    ) -> Residuals | None:
+    def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Innovations of the noise; None if the motion cannot be computed."""
         raw = self.departures(values)
         if raw is None:

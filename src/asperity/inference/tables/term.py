@@ -149,7 +149,7 @@ class LockInTerm(DataTerm):
 
     def estimate_error(self, values: Mapping[str, float]) -> None:
         """Include the errors of epsilon, by the slopes of the predictions at these parameters."""
-        function = self._function(search=self.searches, coarse=self.coarse)
+        function = self._function(coarse=self.coarse)
         given = parameters_at(self.fixed, values, function)
         known = self._nearest(values) if self.searches else None
         response, derivatives = function.value_and_jacobian(given, known, names=["epsilon"])
@@ -163,12 +163,10 @@ class LockInTerm(DataTerm):
         slopes = slopes_of(at, change) * ratio[:, None]
         self._slopes, self._weights = np.nan_to_num(slopes), None
 
-    def residuals(
-        self, values: Mapping[str, float], *, search: bool | None = None
-    ) -> Residuals | None:
+    def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Residuals in standard uncertainties; None if too few rows have a periodic orbit."""
         every = self.least == 1
-        predicted, derivatives, outcome = self.predicted(values, search=search, every=every)
+        predicted, derivatives, outcome = self.predicted(values, every=every)
         solved = outcome == Outcome.CONVERGED
         share = solved.mean()
         if share < self.least:
@@ -348,28 +346,24 @@ class LockInTerm(DataTerm):
             ]
         return sentences
 
-    def _function(self, *, search: bool, coarse: bool) -> ResponseFunction:
-        return self._functions[("coarse" if coarse else "direct") if search else False]
+    def _function(self, *, coarse: bool) -> ResponseFunction:
+        return self._functions[("coarse" if coarse else "direct") if self.searches else False]
 
     def predicted(
-        self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
+        self, free: Mapping[str, float], *, every: bool = False
     ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
         """Prediction, its derivatives by the free parameters, and the outcome of every row.
 
         Parameters
         ----------
         free : mapping of str to float
-        search : bool, optional
-            Whether to search for orbits that the fast method does not reach; by default if the fast
-            method has failed before.
         every : bool
             Whether all rows need an orbit: without one, derivatives are left out.
         """
-        search = self.searches if search is None else search
         applied = self.fixed["epsilon"]
-        function = self._function(search=search, coarse=self.coarse)
+        function = self._function(coarse=self.coarse)
         given = parameters_at(self.fixed, free, function)
-        known = self._nearest(free) if search else None
+        known = self._nearest(free) if self.searches else None
         wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
         values, slopes = function.value_and_jacobian(
             given, known, motions=every or None, every=every, names=wanted
@@ -409,7 +403,7 @@ class LockInTerm(DataTerm):
             Whether orbits are close to those of the last call with derivatives, and start from
             them, on the coarse mesh.
         """
-        function = self._function(search=self.searches, coarse=self.coarse or near)
+        function = self._function(coarse=self.coarse or near)
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
         given = parameters_at(fixed, free, function)
         last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
