@@ -22,3 +22,13 @@ def test_a_coordinate_of_small_influence_counts_unless_a_bound_stops_it(influenc
     assert stopped == pytest.approx(decrease(J[:, :2]), rel=1e-9)
     J[:, 2] = 0
     assert predicted_decrease(r, J, u, low, high) == pytest.approx(stopped, rel=1e-12)
+
+
+def test_dependent_coordinates_decrease_no_more_than_one_of_them():
+    generator = np.random.default_rng(1)
+    r, J = generator.normal(size=40), generator.normal(size=(40, 3))
+    # Parameters that change the predictions in the same way, to the accuracy of orbits.
+    J[:, 2] = 3 * J[:, 0] + 1e-11 * generator.normal(size=40)
+    low, high, u = np.full(3, -50.0), np.full(3, 50.0), np.zeros(3)
+    alone = predicted_decrease(r, J[:, :2], u[:2], low[:2], high[:2])
+    assert predicted_decrease(r, J, u, low, high) == pytest.approx(alone, rel=1e-6)

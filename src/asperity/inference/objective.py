@@ -507,11 +507,7 @@ class Objective:
         Nearly 0 at a minimum, also at a minimum on a bound; larger if a minimisation has stopped at
         the edge of the region in which the residuals exist.
         """
-        r, J = self.residuals(u)
-        gradient = J.T @ r
-        moving = ~self.held(u, gradient)
-        J, gradient = J[:, moving], gradient[moving]
-        return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
+        return levenberg_marquardt.predicted_decrease(*self.residuals(u), u, *self.bounds)
 
     def held(self, u: Float, gradient: Float) -> Bool:
         """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
