@@ -121,9 +121,7 @@ def _by_solved_rows(
     partial = objective.partial()
     chi2 = partial.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(partial, drawn, chi2)]
-    ends = _minimised_from(
-        partial, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
-    )
+    ends = _minimised_from(partial, starts, progress, _COARSE_TOLERANCE, _EVALUATIONS)
     minima = _on_all_rows(objective, ends)
     if not _describes(objective, minima) and _describes(partial, ends):
         beyond = _with_searched_orbits(objective, ends, minima)
@@ -133,7 +131,7 @@ def _by_solved_rows(
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
         if _describes(objective, minima, ends):
             break
-        new = partial.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        new = _rough_minimum(partial, start)
         if math.isfinite(new.chi2) and _is_new(new, ends):
             ends = sorted([*ends, new], key=_CHI2)
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
@@ -177,9 +175,8 @@ def _further(
 
 def _by_way_of_smoother(objective: Objective, start: Float) -> Minimum:
     """The rough minimum from a start, by way of that with larger uncertainties."""
-    smoother, half = objective.smoother(), _EVALUATIONS // 2
-    between = smoother.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=half).u
-    return objective.minimise(between, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+    between = _rough_minimum(objective.smoother(), start, _EVALUATIONS // 2)
+    return _rough_minimum(objective, between.u)
 
 
 def _describes(
@@ -238,7 +235,6 @@ def _minimised_from(
     objective: Objective,
     starts: Sequence[Float],
     progress: Progress | None,
-    *,
     tolerance: float | None = None,
     evaluations: int = 100,
 ) -> list[Minimum]:
@@ -250,6 +246,11 @@ def _minimised_from(
         minima.append(objective.minimise(start, tolerance=tolerance, evaluations=evaluations))
         advance(1)
     return sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2)
+
+
+def _rough_minimum(objective: Objective, start: Float, evaluations: int = _EVALUATIONS) -> Minimum:
+    """The minimum reached from a start, to the coarse tolerance."""
+    return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=evaluations)
 
 
 def _by_few_rows(
@@ -296,15 +297,11 @@ def _roughly_minimised(
     objective: Objective, starts: Sequence[Float], progress: Progress | None
 ) -> list[Minimum]:
     """Minima to a coarse tolerance, best first: few evaluations choose those that are continued."""
-    ends = _minimised_from(
-        objective, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
-    )
+    ends = _minimised_from(objective, starts, progress, _COARSE_TOLERANCE, _FIRST_EVALUATIONS)
     # In 83 fits, none of 50 minimisations so far above one that describes the data ended lower.
     highest = ends[0].chi2 + _CONTINUED if _describes(objective, ends) else math.inf
     apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED] if end.chi2 < highest]
-    return _minimised_from(
-        objective, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
-    )
+    return _minimised_from(objective, apart, None, _COARSE_TOLERANCE, _EVALUATIONS)
 
 
 def _coarse(objective: Objective) -> Objective | None:
@@ -327,7 +324,7 @@ def _on_all_rows(
     for end in ends:
         if minima and end.chi2 > highest:
             break
-        near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        near = _rough_minimum(coarser, end.u)
         if len(distinct([*before, near], _SAME_COARSE)) == len(before):
             continue  # the minimum of an earlier end
         before.append(near)
@@ -361,9 +358,7 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
                 best, {i: x}, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
             )
             if there.chi2 < _HOPELESS * highest:
-                ends.append(
-                    coarse.minimise(there.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
-                )
+                ends.append(_rough_minimum(coarse, there.u))
         for side in (-1, 1):
             apart = [
                 end
@@ -393,8 +388,7 @@ def _minimised_near(
 ) -> Minimum:
     """The minimum reached from u, precise only if it may be one of those that a fit reports."""
     if minima or far_off:
-        evaluations = _FIRST_EVALUATIONS if far_off else _EVALUATIONS
-        near = objective.minimise(u, tolerance=_COARSE_TOLERANCE, evaluations=evaluations)
+        near = _rough_minimum(objective, u, _FIRST_EVALUATIONS if far_off else _EVALUATIONS)
         lowest = min((m.chi2 for m in minima), default=math.inf)
         repeats = near.chi2 > lowest and any(_apart(near, m) < _SAME_COARSE for m in minima)
         if far_off or repeats or near.chi2 > lowest + RIVAL:
