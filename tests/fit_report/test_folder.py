@@ -125,6 +125,18 @@ def test_a_comparison_has_a_page_of_all_laws(fitted, tmp_path):
     assert page.count("<svg") == 1
 
 
+def test_a_law_without_free_parameters_has_a_curve_without_a_width(fitted, tmp_path):
+    (term,) = fitted.objective.terms
+    given = {"material": materials.load("bureau2000"), "fixed": {"eps_ratio": 0.5}}
+    bare = fit(term.table, "elasto-plastic", (), bare=True, **given)
+    write_comparison(tmp_path / "report", judge({"elasto-plastic": fitted, "as published": bare}))
+    assert (tmp_path / "report" / "as published.toml").is_file()
+    (series,) = bands.bands_of(bare, bare.objective.terms[0], None)
+    band = series.bands["mu1"]
+    np.testing.assert_array_equal(band.low, band.high)
+    np.testing.assert_allclose(band.middle[-1], term.table.values["mu1"][-1], rtol=0.05)
+
+
 def test_recordings_are_shown_with_the_motion(tmp_path):
     (run,) = runs_of(CASES["steps"], 1)
     own = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)

@@ -59,7 +59,8 @@ def bands_of(fit: Fit, term: LockInTerm, posterior: Posterior | None) -> list[Se
         Without one, parameters are drawn from the normal approximation.
     """
     values = _drawn(fit, posterior, np.random.default_rng(0))
-    count = len(next(iter(values.values())))
+    # One set if the law has no free parameters.
+    count = max(map(len, values.values()), default=1)
     table = term.table
     series = []
     for label, rows in _series(table):
@@ -123,15 +124,8 @@ def _drawn(fit: Fit, posterior: Posterior | None, random: np.random.Generator) -
         return {n: d.reshape(-1)[chosen] for n, d in posterior.draws.items()}
     unknowns = fit.objective.unknowns
     u = fit.objective.coordinates(fit.values)
-    sd = np.array(
-        [
-            min(abs(p.se / k.slope(p.value)), 1.0) if p.value else 0.0
-            for k, p in zip(unknowns, fit.parameters.values(), strict=True)
-        ]
-    )
-    covariance = fit.correlation * np.outer(sd, sd)
+    covariance = fit.correlation * np.outer(fit.coordinate_errors, fit.coordinate_errors)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    low, high = np.array([k.bounds for k in unknowns]).T
-    drawn = np.clip(u + random.normal(size=(_SETS, u.size)) @ root.T, low, high)
+    drawn = np.clip(u + random.normal(size=(_SETS, u.size)) @ root.T, *fit.objective.bounds)
     return {k.name: np.asarray(k.to_value(drawn[:, i])) for i, k in enumerate(unknowns)}

@@ -309,6 +309,15 @@ class Fit(Warned, Drawn):
         return result
 
     @property
+    def coordinate_errors(self) -> Float:
+        """Standard errors of the coordinates of the fit, shape (n,), at most 1.
+
+        The normal approximation fails farther away: 1 is a factor of e of a positive parameter.
+        """
+        pairs = zip(self.parameters.values(), self.objective.unknowns, strict=True)
+        return np.minimum([abs(p.se / k.slope(p.value)) for p, k in pairs], 1.0)
+
+    @property
     def values(self) -> dict[str, float]:
         """Estimates by name, in SI."""
         return {name: p.value for name, p in self.parameters.items()}

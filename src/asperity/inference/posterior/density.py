@@ -185,12 +185,7 @@ class Whitened:
         """The posterior of a fit, whitened at its mode."""
         objective = fit.objective
         u = objective.coordinates(fit.values)
-        sd = np.array(
-            [
-                min(abs(p.se / k.slope(p.value)) if np.isfinite(p.se) and p.value else 1.0, 1.0)
-                for k, p in zip(objective.unknowns, fit.parameters.values(), strict=True)
-            ]
-        )
+        sd = fit.coordinate_errors
         coordinates = Coordinates.about(objective.unknowns, u, sd)
         low, high, *_ = coordinates
         # At least a tenth of a standard deviation away from the bounds.
