@@ -57,7 +57,7 @@ def run_equations(
     inertia: bool = False,
     radiation_damping: bool = False,
 ) -> Motion:
-    """Equation of motion of a recording, without numbers: `through` sets them.
+    """Equation of motion of a recording, without numbers: `recorded_friction` sets them.
 
     Parameters
     ----------
@@ -122,49 +122,15 @@ def recorded_friction(
     drive = filled_up(drive)
     arrays, wanted = arranged(given, free, motion.size, len(drive.edges))
     room = room or room_for(drive)
-    friction, slopes, done = through(motion, wanted, arrays, drive, reading.filled_up(), room=room)
+    curve, by_curve, steps, done = _integrated(motion, wanted, arrays, drive, room)
+    friction, slopes = _read(
+        motion, wanted, arrays, drive, reading.filled_up(), curve, by_curve, steps
+    )
     n = len(reading.index)
     f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
     # NaN and infinity also fail this comparison.
     good = bool(done) and np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()
     return (f, jacobian) if good else None
-
-
-def through(
-    motion: Motion,
-    free: Free,
-    given: dict[str, Any],
-    drive: Drive,
-    reading: Reading,
-    *,
-    room: int,
-) -> tuple[Array, Array, Array]:
-    """Friction as recorded with the given numbers, and its forward derivatives.
-
-    Parameters
-    ----------
-    motion : Motion
-        Equation of motion; `given` replaces its numbers.
-    free : Free
-        Parameters of the derivatives.
-    given : dict of str to array
-        All parameters, as `arranged` returns them.
-    drive : Drive
-    reading : Reading
-        A reading of n samples.
-    room : int
-        Largest number of steps.
-
-    Returns
-    -------
-    friction : array, shape (n,)
-    derivatives : array, shape (derivatives, n)
-        Along the directions of `free`.
-    done : array, shape ()
-        Whether the end was reached.
-    """
-    curve, slopes, steps, done = _integrated(motion, free, given, drive, room)
-    return *_read(motion, free, given, drive, reading, curve, slopes, steps), done
 
 
 #: Compiled apart from the reading: recordings of any number of samples share the program of a law,
@@ -315,8 +281,8 @@ class RunArrays(NamedTuple):
 class RunResiduals:
     """Innovations of a recording within compiled programs, under the noise of the estimate.
 
-    The motion is differentiated forwards, as by `through`, and the samples, of which there are far
-    more than steps, backwards.
+    The motion is differentiated forwards, as by `recorded_friction`, and the samples, of which
+    there are far more than steps, backwards.
 
     Attributes
     ----------
