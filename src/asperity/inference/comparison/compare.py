@@ -32,10 +32,11 @@ from asperity.inference.holds import HealingTable, joined_holds
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.residuals import DESCRIBED, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
-from asperity.inference.tables.term import LockInTerm, all_converged
+from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import UnfittableLawError
 from asperity.laws import get_law, registered
 from asperity.materials import Material
+from asperity.orbit import Outcome
 from asperity.outputs.json import plain
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import typed
@@ -587,7 +588,7 @@ def what_would_tell(first: Fit, second: Fit) -> str:
             constants = {n: v for n, v in points.items() if n not in f.values}
             term = LockInTerm(trial, f.objective.law, {**f.objective.fixed, **constants}, **motion)
             prediction, _, outcome = term.predicted(f.values)
-            if all_converged(outcome):
+            if (outcome == Outcome.CONVERGED).all():
                 residuals.append(residuals_of(weights, prediction, {}))
         if len(residuals) < 2:
             continue

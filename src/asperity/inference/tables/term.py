@@ -437,11 +437,6 @@ class LockInTerm(DataTerm):
         return result
 
 
-def all_converged(outcome: NDArray[np.int64]) -> bool:
-    """Whether every row has an orbit."""
-    return bool((outcome == Outcome.CONVERGED).all())
-
-
 def parameters_at(
     fixed: Mapping[str, Any], free: Mapping[str, Any], function: ResponseFunction
 ) -> dict[str, Any]:
