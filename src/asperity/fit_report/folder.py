@@ -23,7 +23,13 @@ from asperity.fit_report.pictures import data_figure, laws_figure, residual_figu
 from asperity.inference import Fit, LockInTable, Posterior
 from asperity.inference.comparison.compare import Comparison, comparison_record
 from asperity.inference.fitting.result import fit_record
-from asperity.inference.report import comparison_report, estimates, fit_report, posterior_sections
+from asperity.inference.report import (
+    comparison_report,
+    estimates,
+    fit_report,
+    noise_in_words,
+    posterior_sections,
+)
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
@@ -177,17 +183,13 @@ def data_tables(fit: Fit) -> str:
 
 def _recording(term: RunTerm) -> str:
     """Drive and noise of a recording."""
-    run, noise = term.run, term.noise
+    run = term.run
     ends = run.recorded_times([0.0, *(run.drive.edges[k] for k in run.cuts), run.time[-1]])
     rows = [
         (f"{begin:.6g}", f"{end:.6g}", f"{1e6 * v:.6g}" if v else "hold")
         for begin, end, v in zip(ends[:-1], ends[1:], run.velocities, strict=True)
     ]
-    text = (
-        f"{run.name}: {noise['samples']} samples, of which {noise['effective_samples']:.4g} are "
-        f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
-        + (f" {noise['averaged']}." if noise["averaged"] else "")
-    )
+    text = ". ".join([*noise_in_words(term), ""])
     return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (um/s)"), rows)
 
 

@@ -122,16 +122,21 @@ def quality(fit: Fit) -> Section:
         )
     sentences += [s for term, _ in fit.parts(LockInTerm) if (s := _needed_bandwidth(term.table))]
     for term in fit.objective.terms_of(RunTerm):
-        noise = term.noise
-        sentences.append(
-            f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective of "
-            f"{noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
-        )
-        sentences += [f"{term.name}: {noise['averaged']}"] if noise["averaged"] else []
+        sentences += noise_in_words(term)
     sentences.append(
         f"log-likelihood {fit.log_likelihood:.6g}, AICc {fit.aicc:.6g}, BIC {fit.bic:.6g}"
     )
     return Section("", tuple(sentences), (), rows)
+
+
+def noise_in_words(term: RunTerm) -> list[str]:
+    """Sentences on the noise of a recording, and on the averaging of its samples."""
+    noise = term.noise
+    model = (
+        f"noise {noise['model']}, {noise['effective_samples']:.4g} effective of "
+        f"{noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
+    )
+    return [f"{term.name}: {text}" for text in (model, noise["averaged"]) if text]
 
 
 def _needed_bandwidth(table: LockInTable) -> str:
