@@ -6,12 +6,12 @@ measured.
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
@@ -215,18 +215,13 @@ def predicted(
         table = LockInTable(plan.name, block, {}, {})
         parts.append(_term(plan, hypothesis, table).predicted(values))
         progress(min(start + _BLOCK, total), total)
-    columns = [
-        [np.concatenate(column) for column in zip(*some, strict=True)]
-        for some in (
-            [whole for whole, _, _ in parts],
-            *([slopes[n] for _, slopes, _ in parts] for n in hypothesis.names),
-        )
-    ]
-    seen = np.concatenate([outcome for *_, outcome in parts]) == Outcome.CONVERGED
-    for column in itertools.chain(*columns):
+    *predictions, outcome = jax.tree.map(lambda *columns: np.concatenate(columns), *parts)
+    seen = outcome == Outcome.CONVERGED
+    for column in jax.tree.leaves(predictions):
         seen &= np.isfinite(column.reshape(total, -1)).all(1)
-    whole, *slopes = (Prediction(*(np.where(seen, c.T, 0).T for c in some)) for some in columns)
-    return Predicted(whole, dict(zip(hypothesis.names, slopes, strict=True)), seen)
+    whole, slopes = jax.tree.map(lambda column: np.where(seen, column.T, 0).T, predictions)
+    # The tree has sorted the names.
+    return Predicted(whole, {name: slopes[name] for name in hypothesis.names}, seen)
 
 
 def _term(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> LockInTerm:
