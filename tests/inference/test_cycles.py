@@ -171,6 +171,8 @@ def test_what_is_irregular_is_said_and_what_is_not_there_is_asked_for():
         fit(coarse, "rice-ruina", ["mu0"], fixed=TRUTH)
     with pytest.raises(InputError, match="M must be free or fixed"):
         fit(coarse, "rice-ruina", ["A"], fixed={"B": 0.015, "D0": 1e-6, "K": 300.0})
+    with pytest.raises(InputError, match=r"fixed\['W0'\] must agree with the column"):
+        fit(coarse, "rice-ruina", ["B"], fixed=TRUTH | {"W0": 2 * coarse.W0})
 
 
 @pytest.mark.long

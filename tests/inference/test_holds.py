@@ -172,6 +172,8 @@ def test_what_holds_cannot_say_is_refused(exact):
         ({"radiation_damping": True}, "radiation_damping must have an influence"),
         ({"fixed": {"eps_ratio": 0.5}}, "eps_ratio'] must have an influence"),
         ({"fixed": {"M": "1 kg"}}, "M'] must have an influence"),
+        ({"fixed": {"V": "5 um/s"}}, "V'] must agree with the column of the data"),
+        ({"fixed": {"K": "5e-3 1/um"}}, "K'] must agree with the column of the data"),
     ],
 )
 def test_what_has_no_influence_on_holds_is_refused(exact, options, words):

@@ -17,6 +17,7 @@ from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.inputs import (
     fixed_values,
+    require_agreement,
     require_counted,
     require_enough,
     require_masses,
@@ -29,6 +30,7 @@ from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,
     RunOptions,
+    over_load,
     require_calibrated,
     require_newtons,
     require_no_layer,
@@ -53,7 +55,7 @@ from asperity.inference.unknowns import (
 )
 from asperity.laws import Law
 from asperity.materials import Material
-from asperity.parameters import MACHINE, law_parameters
+from asperity.parameters import MACHINE, law_parameters, point_parameters
 from asperity.recording import Trace
 
 #: Assumed mu0 (dimensionless) and V0 (m/s) for healing: it is measured relative to sliding, so that
@@ -144,6 +146,11 @@ def _of_holds(law: type[Law], table: HealingTable, free: list[str], given: Given
         require(
             holds, "free", f"be parameters of {law.name} with holds", f"'{symbol(name)}'", advice
         )
+    known = point_parameters(law)
+    if "V" in given.fixed:
+        require_agreement(known["V"], given.fixed["V"], table.V)
+    if (K := over_load(given.fixed.get("K"))) is not None:
+        require_agreement(replace(known["K"], kind="per_length"), K, table.K)
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
     constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
     begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
@@ -163,6 +170,9 @@ def _of_cycles(
     """The function to minimise for averaged cycles; all inputs are checked."""
     first, numbers = cycles[0], law_parameters(law)
     # The level of friction is fitted in each cycle.
+    known = point_parameters(law)
+    for name in {"V", "W0"} & given.fixed.keys():
+        require_agreement(known[name], given.fixed[name], [getattr(c, name) for c in cycles])
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
     level = float(np.mean(first.values[:-1]))
     fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed

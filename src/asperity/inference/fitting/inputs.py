@@ -187,13 +187,7 @@ def fixed_values(
             )
         result["K"] = result["K"] * result["W0"]
     for name in (n for n in given if n in points):
-        column, value = np.broadcast_arrays(points[name], result[name])
-        other = np.isfinite(column) & ~np.isclose(column, value, rtol=1e-9, atol=0.0)
-        if other.any():
-            at, kind = int(np.argmax(other)), known[name].kind
-            got = f"{format_si(value[at], kind)} and {format_si(column[at], kind)}"
-            rule, advice = "agree with the column of the data", "leave it out, or remove the column"
-            raise InputError(Argument("fixed", name), rule, got, advice)
+        require_agreement(known[name], result[name], points[name])
     if "eps_ratio" not in free:
         result["eps_ratio"] = ratio = float(
             _checked(law, "fixed", "eps_ratio", given.get("eps_ratio", 1.0))
@@ -202,6 +196,30 @@ def fixed_values(
         advice = "contact would be lost"
         require(not largest >= 1, "eps_ratio times epsilon", "be below 1", f"{largest:g}", advice)
     return result
+
+
+def require_agreement(parameter: Parameter, fixed: Any, column: Any) -> None:
+    """Refuse a fixed number that differs from the numbers of the data.
+
+    Parameters
+    ----------
+    parameter : Parameter
+    fixed : float, str or array
+        In SI, or a text with its unit.
+    column : array
+        In SI; NaN where the data have no number.
+
+    Raises
+    ------
+    InputError
+    """
+    column, value = np.broadcast_arrays(np.atleast_1d(column), parameter.check(fixed))
+    other = np.isfinite(column) & ~np.isclose(column, value, rtol=1e-9, atol=0.0)
+    if other.any():
+        at, kind = int(np.argmax(other)), parameter.kind
+        got = f"{format_si(value[at], kind)} and {format_si(column[at], kind)}"
+        rule, advice = "agree with the column of the data", "leave it out, or remove the column"
+        raise InputError(Argument("fixed", parameter.name), rule, got, advice)
 
 
 def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
