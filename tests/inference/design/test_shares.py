@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from asperity.inference.design.rival import probability_of_deciding
 from asperity.inference.design.shares import (
     Determinant,
     Misfit,
@@ -171,3 +172,11 @@ def test_a_criterion_of_singular_information_is_minus_infinity():
     criterion = Determinant(information, np.zeros((1, 3, 3)), [0])
     assert criterion.value(np.array([1e12])) == -np.inf
     assert criterion.exchanged(np.array([1e12])) == -np.inf
+
+
+@pytest.mark.parametrize(("readings", "probability"), [(4.0, 0.0), (5.0, 1.0)])
+def test_a_rival_without_an_aicc_is_not_excluded(readings, probability):
+    """Three parameters need five data; residuals of 1,000 exclude the rival then."""
+    law, rival = np.ones((1, 1, 1)), np.zeros((1, 1, 3))
+    misfit = Misfit(np.full((1, 1), 1e3), rival, np.zeros(0), np.zeros((0, 3)))
+    assert probability_of_deciding(law, misfit, np.array([readings]), 0) == probability
