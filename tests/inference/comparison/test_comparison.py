@@ -272,6 +272,12 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     assert bare.fit.observables["delta_mu"] == (pytest.approx(away @ away, rel=1e-6), V.size)
     assert bare.fit.dof == 5 * V.size
     assert bare.evidence.log == bare.fit.log_likelihood
+    # A material with a prior of the other law alone, as a fit of that law writes it.
+    of_lambda = pmma["lambda"].model_copy(update={"uncertainty": 0.1})
+    given["prior"] = pmma.model_copy(update={"numbers": {"lambda": of_lambda}})
+    again = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), evidence=False, **given)
+    assert again.laws["rice-ruina"].fit.chi2 == bare.fit.chi2
+    assert again.laws["elasto-plastic"].fit.parameters["lambda"].prior.source == pmma.name
 
 
 def test_a_law_with_too_few_data_for_its_aicc_is_not_compared(made, pmma):

@@ -33,7 +33,7 @@ from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.residuals import DESCRIBED, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import UnfittableLawError
+from asperity.inference.unknowns import UnfittableLawError, material_priors
 from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.orbit import Outcome
@@ -235,11 +235,10 @@ def compare(
         for name in dict.fromkeys(laws)
     }
     # Each law takes the numbers that it has; an empty mapping means the same as None.
-    given = {
-        key: options.pop(key, None) or {}
-        for key in ("fixed", "start", "prior")
-        if not isinstance(options.get(key), Material)
-    }
+    given = {key: options.pop(key, None) or {} for key in ("fixed", "start", "prior")}
+    if isinstance(given["prior"], Material):
+        every = list(dict.fromkeys(n for names in free_by_law.values() for n in names))
+        given["prior"] = material_priors(given["prior"], every)
     not_compared: dict[str, str] = {}
 
     work = _STEPS * len(free_by_law) * (2 if evidence else 1)
