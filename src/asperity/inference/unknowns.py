@@ -266,22 +266,20 @@ def unknown_of(
         rule = f"be in {parameter.unit or 'no unit'}, as all numbers of a prior are SI"
         raise InputError(Argument("prior", name), rule, prior.unit, "convert it")
     middle = given if given else prior.mean if prior else None
-    if usual is not None:
-        low, high = usual
-    elif middle:
-        low, high = middle / 3, middle * 3
-    else:
+    ranges = [] if usual is None else [usual]
+    if middle:
+        ranges.append((min(middle / 3, middle * 3), max(middle / 3, middle * 3)))
+    if not ranges:
         raise UnfittableLawError(
             Argument("start", name),
             "say where to look for a free parameter without a usual range",
             "none",
             f"give a value, or use {Argument('fixed', name)}",
         )
-    if middle:
-        low, high = min(low, middle / 3), max(high, middle * 3)
+    low, high = min(a for a, _ in ranges), max(b for _, b in ranges)
     if prior:
         low, high = max(low, prior.mean - 3 * prior.sd), min(high, prior.mean + 3 * prior.sd)
-        low = max(low, prior.mean / 10)
+        low = max(low, prior.mean / 10) if prior.mean > 0 else low
     high = min(high, upper)
     # A start may be nearly zero, which is no scale.
     typical = math.sqrt(usual[0] * usual[1]) if usual and usual[0] > 0 else 0.0

@@ -15,7 +15,7 @@ from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import unknowns_of
+from asperity.inference.unknowns import Prior, unknowns_of
 from asperity.laws import get_law
 
 LAW = get_law("rice-ruina")
@@ -568,6 +568,13 @@ def test_the_given_start_is_minimised_even_if_four_rows_are_far_off_there():
     u, chi2 = minima_of(Objective((Rows(values, rows),), LAW, unknowns, {}), 0)[0]
     assert u[0] == pytest.approx(start, abs=1e-3)
     assert chi2 == pytest.approx(4 * 100.0**2)
+
+
+def test_starts_lie_within_a_prior_of_a_negative_number():
+    priors = {"alpha": Prior(-0.1, 0.02, "measured")}
+    (alpha,) = unknowns_of(get_law("linker-dieterich"), ["alpha"], start={}, priors=priors)
+    np.testing.assert_allclose(alpha.start, (-0.16, -0.04))
+    assert alpha.middle == pytest.approx(-0.1)
 
 
 class NarrowRows(Rows):
