@@ -38,6 +38,8 @@ _PAIRS = {
     f"{a}_{b}_cov": pair for pair in combinations(OBSERVABLES, 2) for a, b in (pair, pair[::-1])
 }
 _OPERATING = ("V", "epsilon", "frequency")
+#: Fields of a table that hold columns by name.
+_COLUMNS = ("points", "values", "errors", "covariances")
 #: Columns of the standard uncertainty of epsilon.
 _OF_EPSILON = ("epsilon_err", "epsilon_uncertainty")
 #: Columns of texts: the run of a row (the first of these columns that exists); the kind of a row of
@@ -127,20 +129,11 @@ class LockInTable:
     @typed
     def without(self, rows: Bool) -> LockInTable:
         """The table without some of its rows."""
-        keep = ~rows
-
-        def cut(columns: Mapping[Any, Float]) -> dict[Any, Float]:
-            return {name: column[keep] for name, column in columns.items()}
-
-        return replace(
-            self,
-            points=cut(self.points),
-            values=cut(self.values),
-            errors=cut(self.errors),
-            covariances=cut(self.covariances),
-            run=self.run[keep],
-            row_names=self.row_names[keep],
-        )
+        kept: dict[str, Any] = {
+            field: {name: column[~rows] for name, column in getattr(self, field).items()}
+            for field in _COLUMNS
+        }
+        return replace(self, **kept, run=self.run[~rows], row_names=self.row_names[~rows])
 
     @typed
     def disturbed(self, exact: Mapping[str, Float], normal: Float) -> LockInTable:
@@ -649,10 +642,7 @@ def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
 
     whole = LockInTable(
         " and ".join(t.name for t in tables),
-        stacked("points"),
-        stacked("values"),
-        stacked("errors"),
-        stacked("covariances"),
+        *map(stacked, _COLUMNS),
         np.concatenate([t.run for t in tables]),
         tuple(r for t in tables for r in t.remarks),
         np.concatenate(
