@@ -110,12 +110,14 @@ def quality(fit: Fit) -> Section:
     ]
     rows: tuple[tuple[str, ...], ...] = ()
     if fit.judged_by_chi2:
-        good = fit.dof <= 0 or fit.p_value >= MISFIT
-        sentences = [
-            f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = {fit.p_value:.3g}: "
-            f"the law {'describes' if good else 'does not describe'} these data within their "
-            f"uncertainties (it does not below {MISFIT:g})"
-        ]
+        sentences = ["as many free parameters as data: nothing is left to judge the law by"]
+        if fit.dof > 0:
+            good = fit.p_value >= MISFIT
+            sentences = [
+                f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = "
+                f"{fit.p_value:.3g}: the law {'describes' if good else 'does not describe'} these "
+                f"data within their uncertainties (it does not below {MISFIT:g})"
+            ]
         rows = tuple(
             (name, f"{chi2:.4g}", f"for {count} data")
             for name, (chi2, count) in fit.observables.items()

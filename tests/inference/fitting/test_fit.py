@@ -12,6 +12,7 @@ from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.answers import answer_fit
 from asperity.inference.fitting.inputs import fixed_values, free_by_default
 from asperity.inference.fitting.result import Optimum, fit_record
+from asperity.inference.report import quality
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
 from asperity.questions.fit import Fit
@@ -368,6 +369,7 @@ def test_as_many_parameters_as_data_are_refused_except_one_of_one(pmma):
     result = fit(table_of(columns), "rice-ruina", ("eps_ratio",), material=pmma, starts=1)
     assert result.converged
     assert result.chi2 == pytest.approx(0, abs=1e-6)
+    assert "nothing is left to judge the law by" in quality(result).sentences[0]
 
 
 def test_a_file_with_a_recording_is_fitted_as_one(tmp_path) -> None:
