@@ -169,10 +169,10 @@ def _of_cycles(
 ) -> Objective:
     """The function to minimise for averaged cycles; all inputs are checked."""
     first, numbers = cycles[0], law_parameters(law)
-    # The level of friction is fitted in each cycle.
     known = point_parameters(law)
-    for name in {"V", "W0"} & given.fixed.keys():
+    for name in [n for n in ("V", "W0") if n in given.fixed]:
         require_agreement(known[name], given.fixed[name], [getattr(c, name) for c in cycles])
+    # The level of friction is fitted in each cycle.
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
     level = float(np.mean(first.values[:-1]))
     fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
