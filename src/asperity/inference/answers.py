@@ -94,7 +94,8 @@ def _heading(path: Path) -> list[str] | None:
         with path.open(encoding=encoding, errors="replace") as file:
             for line in file:
                 if line.strip() and not line.lstrip().startswith("#"):
-                    return re.split(r"[,;\t\s]+", line.strip())
+                    # Some programs write all headings in quotation marks.
+                    return re.split(r'[,;\s"]+', line)
     except OSError:
         return None
     return []

@@ -12,11 +12,13 @@ import asperity as asp
 from asperity import Slider, periodic_response
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
-from asperity.inference import fit, read_table, table_of
+from asperity.inference import HealingTable, LockInTable, fit, read_table, table_of
+from asperity.inference.answers import read_data
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.residuals import outlying_rows, standardised
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.record import modulated_record
+from asperity.questions.fit import Data, Fit
 from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
@@ -236,6 +238,22 @@ def test_a_table_without_headings_is_refused(tmp_path):
     path.write_text("1e-6,0.1\n2e-6,0.2\n")
     with pytest.raises(InputError, match="must have the columns V, epsilon, frequency"):
         read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("heading", "row", "kind"),
+    [
+        ('"","V","epsilon","frequency","mu1","mu1_err"', '"1",1e-6,0.1,120,1e-3,1e-5', LockInTable),
+        ('"hold_time";"healing";"V";"K"', "10;0.01;1e-6;1e3", HealingTable),
+    ],
+)
+def test_headings_in_quotation_marks_are_those_of_a_table(tmp_path, heading, row, kind):
+    """As `write.csv` of R writes them, with a column of row numbers."""
+    path = tmp_path / "table.csv"
+    path.write_text(f"{heading}\n{row}\n")
+    (table,) = read_data(Fit(data=(Data(file=path),)))
+    assert isinstance(table, kind)
+    assert table.rows == 1
 
 
 def test_unstable_responses_are_no_readings(pmma):
