@@ -640,12 +640,13 @@ def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
             for n in names
         }
 
+    columns: dict[str, Any] = {field: stacked(field) for field in _COLUMNS}
     whole = LockInTable(
         " and ".join(t.name for t in tables),
-        *map(stacked, _COLUMNS),
-        np.concatenate([t.run for t in tables]),
-        tuple(r for t in tables for r in t.remarks),
-        np.concatenate(
+        **columns,
+        run=np.concatenate([t.run for t in tables]),
+        remarks=tuple(r for t in tables for r in t.remarks),
+        row_names=np.concatenate(
             [
                 t.row_names if len(tables) == 1 else [f"{n} of {t.name}" for n in t.row_names]
                 for t in tables
