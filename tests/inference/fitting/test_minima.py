@@ -8,10 +8,11 @@ import pytest
 
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.estimated_noise import with_noise
+from asperity.inference.fitting.fit import with_estimated_errors
 from asperity.inference.fitting.intervals import Profile
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.levenberg_marquardt import minimised
-from asperity.inference.objective import Objective, Residuals
+from asperity.inference.objective import Minimum, Objective, Residuals
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
@@ -575,6 +576,28 @@ def test_starts_lie_within_a_prior_of_a_negative_number():
     (alpha,) = unknowns_of(get_law("linker-dieterich"), ["alpha"], start={}, priors=priors)
     np.testing.assert_allclose(alpha.start, (-0.16, -0.04))
     assert alpha.middle == pytest.approx(-0.1)
+
+
+class Estimated(Formula):
+    """Residuals of which all but the first are smaller next to SECOND, by errors of epsilon."""
+
+    measured_epsilon, estimated = True, False
+
+    def estimate_error(self, values):
+        self.estimated = True
+
+    def residuals(self, values):
+        result, away = super().residuals(values), abs(math.log(values["D0"]) - SECOND)
+        size = np.where(result.row > 0, 0.9 if self.estimated and away < 0.5 else 1.0, 1.0)
+        return result._replace(values=size * result.values)
+
+
+def test_errors_of_epsilon_may_turn_the_order_of_minima_around():
+    objective = replace(objective_of(two_minima, 1e-6), terms=(Estimated(two_minima),))
+    before = [Minimum(np.array([x]), 99.0) for x in (FIRST, SECOND)]
+    best, other = with_estimated_errors(objective, before)
+    assert best.u[0] == pytest.approx(SECOND, abs=1e-6)
+    assert (best.chi2, other.chi2) == pytest.approx((99 * 0.81, 99))
 
 
 class NarrowRows(Rows):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Annotated, Any
 
 from asperity.errors import InputError
@@ -167,7 +168,7 @@ def fit(
         objective = compared(cleaner)
     holds = objective.terms_of(HoldTerm)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
-        minima = _with_estimated_errors(objective, minima)
+        minima = with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
     warnings = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
     warnings += unusual_numbers(result, recordings)
@@ -195,8 +196,8 @@ def fit(
     return replace(result, sentences=(*warnings, *result.sentences))
 
 
-def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
-    """Minima with errors that depend on a fit: of holds without errors, and of epsilon."""
+def with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
+    """Minima with errors that depend on a fit, best first: of holds without errors, of epsilon."""
     values = objective.named(minima[0].u)
     for hold in objective.terms_of(HoldTerm):
         hold.estimate_error(values, len(objective.unknowns))
@@ -204,8 +205,7 @@ def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[
         if table.measured_epsilon:
             table.estimate_error(values)
     objective.forget()
-    best = objective.minimise(minima[0].u)
-    return [best, *(Minimum(m.u, objective.chi2(m.u)) for m in minima[1:])]
+    return sorted((objective.minimise(m.u) for m in minima), key=attrgetter("chi2"))
 
 
 class _Steps:
