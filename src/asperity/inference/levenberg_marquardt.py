@@ -30,8 +30,9 @@ _CORRECTIONS, _LONGEST, _SHARE = 3, 0.75, 0.25
 #: Smaller decreases of the sum of squares are negligible: the square of a hundredth of a standard
 #: error.
 _DECREASE = 1e-4
-#: Columns of a Jacobian are dependent if a combination of them, each of unit length, is shorter:
-#: orbits are no more accurate. It would be a direction of noise, along which residuals do not fall.
+#: Columns of a Jacobian are dependent if a combination of them, each over its largest element, is
+#: shorter than this share of the longest: orbits are no more accurate. It would be a direction of
+#: noise, along which residuals do not fall.
 _DEPENDENT = 1e-8
 #: A coordinate closer to its bound than this is at the bound.
 AT_BOUND = 1e-6
@@ -55,7 +56,7 @@ def predicted_decrease(r: Float, J: Float, u: Float, low: Float, high: Float) ->
     """
     free = np.where(J.T @ r > 0, u - low, high - u) > AT_BOUND
     J = J[:, free & J.any(axis=0)]
-    J = J / np.linalg.norm(J, axis=0)
+    J = J / np.abs(J).max(axis=0)
     return float(np.sum((J @ np.linalg.lstsq(J, r, rcond=_DEPENDENT)[0]) ** 2))
 
 
