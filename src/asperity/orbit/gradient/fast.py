@@ -18,8 +18,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations, contracted, implicit_solution
 from asperity.algebra.mirrored_grid import grid
-from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points, jacobian
-from asperity.orbit.batches import points_of
+from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.balance import BalanceEquations
@@ -30,6 +29,7 @@ from asperity.orbit.methods.fourier import (
     advance,
     force_spectrum,
     fourier_orbit,
+    jacobian_on,
     load_cycle,
     orbit_error,
     rates_on,
@@ -47,7 +47,6 @@ _NODES, _GRADING, _SHARPEST = 32, 0.3, 18.0
 _DAMPED_NODES, _INERTIAL_NODES = 32, 64
 #: Estimated error that must be reached.
 _ERROR = 1e-9
-_TOLERANCE, _MOST_STEPS = 1e-10, 40
 
 
 class FastOrbits(NamedTuple):
@@ -154,14 +153,7 @@ class FourierEquations(Equations):
         self, problem: Problem, harmonics: int
     ) -> tuple[FourierUnknowns, tuple[()], Array, Array]:
         """Unknowns, no data of linear systems, estimated error (points,), and steps."""
-        orbit = fourier_orbit(
-            *problem,
-            points_of(problem),
-            nodes=self.nodes,
-            grading=self.grading,
-            tolerance=_TOLERANCE,
-            max_steps=_MOST_STEPS,
-        )
+        orbit = fourier_orbit(problem, nodes=self.nodes, grading=self.grading)
         error = orbit_error(problem.system, self.cycle(problem), orbit, harmonics)
         return FourierUnknowns(orbit.mean, orbit.zero_mean), (), error, orbit.steps
 
@@ -185,9 +177,7 @@ class FourierEquations(Equations):
 
     def jacobian(self, problem: Problem, unknowns: FourierUnknowns) -> Matrix:
         """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""
-        states = together(*unknowns)
-        _, push = jax.linearize(rates_on(problem.system, self.cycle(problem)), *states)
-        return jacobian(push, states)
+        return jacobian_on(problem.system, self.cycle(problem), together(*unknowns))
 
     def prepare(
         self, parameters: tuple[Problem, tuple[()], Array], unknowns: FourierUnknowns

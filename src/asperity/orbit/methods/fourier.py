@@ -35,7 +35,7 @@ from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
 from asperity.arrays import Float
-from asperity.loads import Excitation, Harmonic, Modulation
+from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import FAST_BLOCK, FEW, chunk_of, points_of, run_chunks, take
 from asperity.orbit.floquet import floquet_form
 from asperity.orbit.mesh.mesh import eccentric_phase
@@ -53,6 +53,8 @@ _ROUND_OFF = 1e-12
 
 #: The averaged limit is itself no closer to the orbit than this.
 _AVERAGED_TOLERANCE = 1e-2
+#: Bound on the error estimated from the observed contraction, and the largest number of steps.
+_TOLERANCE, _MOST_STEPS = 1e-10, 40
 
 #: Convergence is checked at every third node: the changes are smooth.
 _LOOKED_AT = slice(1, None, 3)
@@ -128,6 +130,12 @@ def rates_on(system: QuasiStatic, cycle: LoadCycle) -> Callable[..., States]:
         return tuple(system.rates(jnp.stack(states), cycle.at))
 
     return rates
+
+
+def jacobian_on(system: QuasiStatic, cycle: LoadCycle, states: States) -> Matrix:
+    """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""
+    _, push = jax.linearize(rates_on(system, cycle), *states)
+    return jacobian(push, states)
 
 
 def together(mean: States, zero_mean: States) -> States:
@@ -229,39 +237,25 @@ def iterated(
     return unknowns, jnp.where(jnp.isnan(change), jnp.inf, error), steps
 
 
-def fourier_orbit(
-    system: QuasiStatic,
-    load: Modulation,
-    points: int,
-    *,
-    nodes: int,
-    grading: float,
-    tolerance: float,
-    max_steps: int,
-) -> FourierOrbit:
+def fourier_orbit(problem: Problem, *, nodes: int, grading: float) -> FourierOrbit:
     """Iterate to the periodic orbit of every operating point.
 
     Parameters
     ----------
-    system : QuasiStatic
-        Parameters of shape (points,).
-    load : Modulation
-    points : int
-        Number of operating points.
+    problem : Problem
+        Of a `QuasiStatic` system, parameters of shape (points,).
     nodes : int
         Grid points per period, even.
     grading : float
         g in theta = tau + g sin(tau), 0 <= g < 1.
-    tolerance : float
-        Bound on the error estimated from the observed contraction.
-    max_steps : int
 
     Returns
     -------
     FourierOrbit
         `error` holds the estimate; inf where the iteration does not contract.
     """
-    cycle = load_cycle(Problem(system, load), nodes, grading)
+    (system, load), points = problem, points_of(problem)
+    cycle = load_cycle(problem, nodes, grading)
     # Of a load that is known to be even, half of the symmetric grid suffices.
     part = nodes // 2 if isinstance(load, Harmonic) else nodes
     at = jax.tree.map(lambda a: a[:part] if jnp.ndim(a) else a, cycle.at)
@@ -279,7 +273,7 @@ def fourier_orbit(
 
     start = averaged.centre, zero
     (mean, zero_mean), error, steps = iterated(
-        step, start, points, tolerance, _ROUND_OFF, max_steps
+        step, start, points, _TOLERANCE, _ROUND_OFF, _MOST_STEPS
     )
     return FourierOrbit(mean, zero_mean, error, steps, grading)
 
@@ -290,11 +284,7 @@ def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:
 
 
 def fourier_observables(
-    system: QuasiStatic,
-    load: Modulation,
-    orbit: FourierOrbit,
-    *,
-    harmonics: int,
+    problem: Problem, orbit: FourierOrbit, harmonics: int
 ) -> tuple[Observables, Array]:
     """Observables of a converged orbit, and their estimated error, (points,).
 
@@ -302,17 +292,16 @@ def fourier_observables(
 
     Parameters
     ----------
-    system, load
+    problem : Problem
         As for `fourier_orbit`.
     orbit : FourierOrbit
     harmonics : int
         Their number.
     """
-    cycle = load_cycle(Problem(system, load), len(orbit.zero_mean[0]), orbit.grading)
+    system = problem.system
+    cycle = load_cycle(problem, len(orbit.zero_mean[0]), orbit.grading)
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
-    states = together(orbit.mean, orbit.zero_mean)
-    _, push = jax.linearize(rates_on(system, cycle), *states)
-    J = jacobian(push, states)
+    J = jacobian_on(system, cycle, together(orbit.mean, orbit.zero_mean))
     trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
     floquet = floquet_form(stretched(cycle, J), cycle.integral)
     error = orbit_error(system, cycle, orbit, harmonics)
@@ -396,10 +385,8 @@ def fast_solve(
 
     def solve(block: Problem) -> tuple[Observables, Array, Array, FourierOrbit | None]:
         count = points_of(block)
-        orbit = fourier_orbit(
-            *block, count, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
-        )
-        observables, error = fourier_observables(*block, orbit, harmonics=harmonics)
+        orbit = fourier_orbit(block, nodes=nodes, grading=grading)
+        observables, error = fourier_observables(block, orbit, harmonics)
         each = {name: jnp.full(count, getattr(orbit, name)) for name in ("steps", "grading")}
         return observables, error, each["steps"], orbit._replace(**each) if orbits else None
 
