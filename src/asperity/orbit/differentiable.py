@@ -27,7 +27,7 @@ from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.mesh_derivatives import derivatives_of, searched_values, values_of
+from asperity.orbit.gradient.mesh_derivatives import add_derivatives, searched_values, values_of
 from asperity.orbit.gradient.parametrised import (
     Parameters,
     ParametrisedProblem,
@@ -173,10 +173,10 @@ class ResponseFunction:
         whole, table = _differentiate(padded, orbits.fast, orbits.wanted, program=orbits.program)
         whole = _with_searched(whole, orbits)
         if not _traced(padded):
-            outcome = np.asarray(whole.outcome)[: points or 1]
             table = np.array(table)
-            if not every or (outcome == Outcome.CONVERGED).all():
-                _add_searched_derivatives(table, padded, orbits, names)
+        outcome = whole.outcome[: points or 1]
+        if orbits.searched and (not every or (outcome == Outcome.CONVERGED).all()):
+            add_derivatives(table, orbits.program, padded, orbits.searched, names)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
         derivative = partial(
@@ -457,21 +457,6 @@ def _with_searched(values: ResponseValues, orbits: _Orbits) -> ResponseValues:
         for target, part in zip(whole, values, strict=True):
             target[index] = part
     return whole
-
-
-def _add_searched_derivatives(
-    table: Float,
-    parameters: Parameters,
-    orbits: _Orbits,
-    names: Collection[str] | None,
-) -> None:
-    """Write derivatives at the orbits of the search into the result of `_differentiate`."""
-    program = orbits.program
-    for index, on_mesh in orbits.searched.parts if orbits.searched else []:
-        part = {n: np.asarray(v)[index] for n, v in parameters.items()}
-        table[:, index] = derivatives_of(
-            program.equations, part, on_mesh, multipliers=program.multipliers, names=names
-        )
 
 
 def _values(

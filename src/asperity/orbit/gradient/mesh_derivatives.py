@@ -11,7 +11,7 @@ transfer maps T_i.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import Any
 
@@ -33,7 +33,7 @@ from asperity.orbit.gradient.parametrised import (
     Program,
     ResponseValues,
 )
-from asperity.orbit.gradient.search import MeshOrbits, search_orbits
+from asperity.orbit.gradient.search import MeshOrbits, SearchedOrbits, search_orbits
 from asperity.orbit.mesh.equations import (
     collocated,
     condensed_jacobian,
@@ -133,28 +133,25 @@ def _solved(
 def _orbit_changes(orbit: Orbit, response: Float, constant: Float) -> Float:
     """Changes of the states at the collocation points, (directions, size, STAGES, ...)."""
     coefficients = np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)
-    parts = []
-    for start in range(0, constant.shape[2], _SIDES):
-        padded = _filled(constant[:, :, start : start + _SIDES])
-        parts.append(np.asarray(_solved(response, padded, orbit.widths, coefficients)))
+    parts = [_solved(response, part, orbit.widths, coefficients) for part in _sets(constant)]
     return np.concatenate(parts)[: constant.shape[2]]
 
 
-def _filled(sides: Float) -> Float:
-    """Right-hand sides padded with zeros to the number that is solved together."""
-    missing = _SIDES - sides.shape[2]
-    return np.pad(sides, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (sides.ndim - 3)])
+def _sets(sides: Float) -> list[Float]:
+    """Right-hand sides, (size, STAGES, sides, ...), as many as are solved together.
+
+    The last set is filled up with zeros.
+    """
+    filling = [(0, 0)] * sides.ndim
+    filling[2] = 0, -sides.shape[2] % _SIDES
+    return np.split(np.pad(sides, filling), -(-sides.shape[2] // _SIDES), axis=2)
 
 
 def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Float]:
     """`condensed_jacobian` of any number of right-hand sides, by one compiled program."""
-    count = sides.shape[2]
-    constants = []
-    for start in range(0, count, _SIDES):
-        part = _filled(sides[:, :, start : start + _SIDES])
-        response, constant = condensed_jacobian(jacobian, part, orbit)
-        constants.append(constant)
-    return response, np.concatenate(constants, axis=2)[:, :, :count]
+    parts = [condensed_jacobian(jacobian, part, orbit) for part in _sets(sides)]
+    constant = np.concatenate([constant for _, constant in parts], axis=2)
+    return parts[0][0], constant[:, :, : sides.shape[2]]
 
 
 def _multiplier_columns(
@@ -245,32 +242,37 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[Complex, Complex, Float]:
 
 def values_of(orbits: MeshOrbits, *, multipliers: bool) -> ResponseValues:
     """Response of converged orbits, NumPy arrays."""
-    points = len(orbits.mean_friction)
-    logs = orbits.log_multipliers if multipliers else np.zeros((0, points), complex)
+    points, logs = orbits.numbers.shape[1], orbits.log_multipliers
+    if logs is None or not multipliers:
+        logs = np.zeros((0, points), complex)
     outcome = np.full(points, int(Outcome.CONVERGED))
-    return ResponseValues(orbits.mean_friction, orbits.harmonics.T, logs.T, outcome)
+    return ResponseValues(orbits.numbers[0].real, orbits.numbers[1:].T, logs.T, outcome)
 
 
-def derivatives_of(
-    equations: ParametrisedProblem,
-    parameters: dict[str, Float],
-    orbits: MeshOrbits,
-    *,
-    multipliers: bool,
+def add_derivatives(
+    table: Float,
+    program: Program,
+    parameters: Mapping[str, Any],
+    orbits: SearchedOrbits,
     names: Collection[str] | None = None,
-) -> Float:
-    """`orbit_derivatives` at the points of `parameters`, in chunks of a fixed size."""
-    problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    logs = orbits.log_multipliers if multipliers else None
-    everyone = np.arange(len(orbits.mean_friction))
-    count = len(orbits.harmonics)
+) -> None:
+    """Write `orbit_derivatives` at the orbits of the search into a table of all points.
 
-    def table(problem: Problem, orbit: Orbit, logs: Any) -> Float:
-        return np.moveaxis(orbit_derivatives(equations, problem, orbit, count, logs, names), 1, -1)
+    The table has the shape (parameters, points, columns).
+    """
+    equations, harmonics = program.equations, program.harmonics
 
-    inputs, chunk = (problem, orbits.orbit, logs), mesh_chunk(problem.system.size)
-    parts = [part for _, part in run_chunks(table, inputs, everyone, chunk)]
-    return np.moveaxis(np.concatenate(parts, axis=-1), -1, 1)
+    def derivatives(problem: Problem, orbit: Orbit, logs: Any) -> Float:
+        part = orbit_derivatives(equations, problem, orbit, harmonics, logs, names)
+        return np.moveaxis(part, 1, -1)
+
+    for index, on_mesh in orbits.parts:
+        numbers = {n: np.asarray(v)[index] for n, v in parameters.items()}
+        problem = jax.tree.map(np.asarray, equations.problem(numbers))
+        logs = on_mesh.log_multipliers if program.multipliers else None
+        inputs, chunk = (problem, on_mesh.orbit, logs), mesh_chunk(problem.system.size)
+        for rows, part in run_chunks(derivatives, inputs, np.arange(len(index)), chunk):
+            table[:, index[rows]] = np.moveaxis(part, -1, 1)
 
 
 def searched_values(parameters: Parameters, wanted: Array, program: Program) -> ResponseValues:
@@ -334,9 +336,8 @@ def _response(
     table = np.zeros((len(equations.names) * derivatives, points, count))
     for index, part in orbits.parts:
         columns[index] = values_of(part, multipliers=program.multipliers).columns
-        if derivatives:
-            here = {n: v[index] for n, v in parameters.items()}
-            table[:, index] = derivatives_of(equations, here, part, multipliers=program.multipliers)
+    if derivatives:
+        add_derivatives(table, program, parameters, orbits)
     return columns, np.asarray(orbits.outcome), table
 
 

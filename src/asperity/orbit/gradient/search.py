@@ -70,22 +70,15 @@ class MeshOrbits(NamedTuple):
     Attributes
     ----------
     orbit : Orbit
-    mean_friction : array, shape (points,)
-    harmonics : complex array, shape (count, points)
-    log_multipliers : complex array, shape (states, points)
-        As `sorted_logs` sorts them; without states after a direct search, which does not resolve
-        them.
+    numbers : complex array, shape (1 + count, points)
+        Mean and harmonics.
+    log_multipliers : complex array, shape (states, points), or None
+        As `sorted_logs` sorts them; None after a direct search, which does not resolve them.
     """
 
     orbit: Orbit
-    mean_friction: Float
-    harmonics: Complex
-    log_multipliers: Complex
-
-    @classmethod
-    def of(cls, orbit: Orbit, numbers: Complex) -> MeshOrbits:
-        """Orbits without multipliers, with their mean and harmonics, (1 + count, points)."""
-        return cls(orbit, numbers[0].real, numbers[1:], np.zeros((0, numbers.shape[1]), complex))
+    numbers: Complex
+    log_multipliers: Complex | None = None
 
 
 class SearchedOrbits(NamedTuple):
@@ -227,7 +220,7 @@ def followed_orbits(
             accurate |= solved & (not meshes)
             kept = np.flatnonzero(accurate)
             if len(kept):
-                yield part[kept], MeshOrbits.of(take(fine, kept), now[:, kept])
+                yield part[kept], MeshOrbits(take(fine, kept), now[:, kept])
             left.append(part[~accurate & (known | solved)])
             if not known:
                 before[:, part] = now
@@ -319,7 +312,7 @@ def search_orbits(
     for some, numbers in run_chunks(
         read, (problem, series), exact, mesh_chunk(problem.system.size)
     ):
-        keep(some, MeshOrbits.of(take(series, some), numbers))
+        keep(some, MeshOrbits(take(series, some), numbers))
     follow(series, np.setdiff1d(slow, exact))
     if len(rows := left()):
         follow(*orbits_from_averaged_limit(problem, rows, _PATIENCE if coarse else math.inf))
