@@ -34,6 +34,7 @@ from asperity.orbit.mesh.arclength import (
     straight,
 )
 from asperity.orbit.mesh.equations import read_orbit
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change, remeshed
 from asperity.orbit.search import find_orbits
 from asperity.orbit.solution import SearchOptions
@@ -50,10 +51,6 @@ class BranchOrbit(NamedTuple):
 
     Attributes
     ----------
-    t : float
-        Coordinate along the line of parameters.
-    direction : float
-        Derivative of t by the arclength: its sign changes at folds.
     mean_friction : float
     harmonics : complex array, shape (harmonics,)
     logs : complex array, shape (states,)
@@ -64,13 +61,21 @@ class BranchOrbit(NamedTuple):
         From where the next step starts.
     """
 
-    t: float
-    direction: float
     mean_friction: float
     harmonics: Complex
     logs: Complex
     omega: float
     point: ContinuationPoint
+
+    @property
+    def t(self) -> float:
+        """Coordinate along the line of parameters."""
+        return float(self.point.t[0])
+
+    @property
+    def direction(self) -> float:
+        """Derivative of t by the arclength: its sign changes at folds."""
+        return float(self.point.tangent.t[0])
 
     @property
     def unstable(self) -> int:
@@ -108,8 +113,6 @@ class BranchFollower(NamedTuple):
         read = read_orbit(problem, step.orbit, self.harmonics)
         logs = log_multipliers(read.monodromy, read.log_scale, read.log_determinant)
         orbit = BranchOrbit(
-            float(following.t[0]),
-            float(following.tangent.t[0]),
             float(read.mean_friction[0]),
             read.harmonics[:, 0],
             logs[:, 0],
@@ -159,19 +162,15 @@ class BranchFollower(NamedTuple):
         if not solution.converged[0]:
             return None
         orbit = remeshed(problem, solution.orbit, INTERVALS)
-        tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
-        start = self.at_origin(ContinuationPoint(orbit, zero, tangent, np.ones_like(orbit.centre)))
+        tangent, units = _at_constant_t(orbit), np.ones_like(orbit.centre)
+        start = self.across_origin(ContinuationPoint(orbit, zero, tangent, units))
         if start is None:
             return None
-        point = first_point(self.line, start.point.orbit, zero)
-        return start._replace(direction=float(point.tangent.t[0]), point=point)
+        return start._replace(point=first_point(self.line, start.point.orbit, zero))
 
     def at_origin(self, point: ContinuationPoint) -> BranchOrbit | None:
         """The orbit at t = 0, from the orbit of a point nearby."""
-        # With this tangent the plane of the corrector is that of constant t.
-        nodes = np.zeros_like(point.tangent.nodes)
-        tangent = Change(nodes, np.zeros_like(point.tangent.slopes), np.ones(1))
-        return self.across_origin(point._replace(tangent=tangent))
+        return self.across_origin(point._replace(tangent=_at_constant_t(point.orbit)))
 
     def across_origin(self, point: ContinuationPoint) -> BranchOrbit | None:
         """The orbit in the plane across the branch of a point nearby, from the guess t = 0."""
@@ -184,6 +183,11 @@ class BranchFollower(NamedTuple):
         slopes = np.zeros(orbit.slopes.shape)  # a step of length zero does not use them
         tangent = Change(carried, slopes, point.tangent.t)
         return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
+
+
+def _at_constant_t(orbit: Orbit) -> Change:
+    """The tangent with which the plane of the corrector is that of constant t."""
+    return Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
 
 
 #: Brent's method between two orbits, and the secant method from an orbit, on the distance from it.

@@ -202,35 +202,30 @@ class Branch(Displayed):
         """
         import xarray
 
-        def along(values: Any, units: str, name: str, *extra: str) -> tuple:
-            return ("point", *extra), values, {"units": units, "long_name": name}
+        def variable(dims: tuple[str, ...], values: Any, units: str, name: str) -> tuple:
+            return dims, values, {"units": units or "1", "long_name": name}
 
-        def at(values: list, units: str, name: str) -> tuple:
-            return "bifurcation", np.asarray(values), {"units": units, "long_name": name}
-
-        unit, bifurcations = self.unit or "1", self.bifurcations
-        data = {
-            "parameter": along(self.parameter, unit, self.name),
-            "mean_friction": along(self.mean_friction, "1", "mean of F/W0"),
-            "mu1": along(self.mu1, "1", "first harmonic of F/W0, peak"),
-            "mu2": along(self.mu2, "1", "second harmonic of F/W0, peak"),
-            "stable": along(self.stable, "1", "whether all multipliers are inside the unit circle"),
-            "bifurcation_kind": at([b.kind for b in bifurcations], "1", "kind of the bifurcation"),
-            "bifurcation_value": at([b.value for b in bifurcations], unit, self.name),
-            "bifurcation_frequency": at(
-                [b.frequency for b in bifurcations], "Hz", "frequency of the critical mode"
-            ),
-            "bifurcation_stability_change": at(
-                [b.stability_change for b in bifurcations], "1", "+1 gained, -1 lost, 0 neither"
-            ),
+        points = {
+            "parameter": (self.unit, self.name),
+            "mean_friction": ("", "mean of F/W0"),
+            "mu1": ("", "first harmonic of F/W0, peak"),
+            "mu2": ("", "second harmonic of F/W0, peak"),
+            "stable": ("", "whether all multipliers are inside the unit circle"),
         }
-        for name, values, axis in (
-            ("harmonics", self.harmonics, "harmonic"),
-            ("log_multipliers", self.log_multipliers, "multiplier"),
-        ):
+        data = {n: variable(("point",), getattr(self, n), *about) for n, about in points.items()}
+        bifurcations = {
+            "kind": ("", "kind of the bifurcation"),
+            "value": (self.unit, self.name),
+            "frequency": ("Hz", "frequency of the critical mode"),
+            "stability_change": ("", "+1 gained, -1 lost, 0 neither"),
+        }
+        for name, about in bifurcations.items():
+            values = np.array([getattr(b, name) for b in self.bifurcations])
+            data[f"bifurcation_{name}"] = variable(("bifurcation",), values, *about)
+        for name, axis in (("harmonics", "harmonic"), ("log_multipliers", "multiplier")):
             for part in ("real", "imag"):
-                label = f"{part} part of {name}"
-                data[f"{name}_{part}"] = along(getattr(values, part), "1", label, axis)
+                values, label = getattr(getattr(self, name), part), f"{part} part of {name}"
+                data[f"{name}_{part}"] = variable(("point", axis), values, "", label)
         return xarray.Dataset(data, attrs=self.provenance)
 
     @property

@@ -60,15 +60,14 @@ _RESULTS = {
 
 
 def _followed(
-    follower: BranchFollower,
+    origin: BranchOrigin,
     start: BranchOrbit,
-    moving: ContinuedParameter,
-    problem: Problem,
     most_steps: int,
     progress: Callable[[int, int], None] | None,
     periods: int = 1,
 ) -> Branch:
     """Follow a branch until it leaves the span."""
+    follower, moving, problem = origin
     followed = ParameterBranch(follower, start, most_steps, counted(progress, most_steps))
     why = followed.follow()
     followed.cut()
@@ -90,7 +89,7 @@ def _followed(
         completed=why in ("end", "start"),
         motion=problem.system,
         fixed=fixed_parameters(problem, moving.name),
-        origin=BranchOrigin(follower, moving, problem),
+        origin=origin,
         last=orbits[-1].point,
     )
 
@@ -200,7 +199,7 @@ def continuation(
         got = f"none at {moving.name} = {moving.start:g} {moving.unit}".rstrip()
         advice = "start elsewhere, such as at a small epsilon"
         raise InputError("span", "start where there is a periodic orbit", got, advice)
-    return _followed(follower, start, moving, problem, most_steps, progress)
+    return _followed(BranchOrigin(follower, moving, problem), start, most_steps, progress)
 
 
 #: Distances from the bifurcation at which a doubled orbit is tried (change of the log slip rate).
@@ -285,7 +284,7 @@ def doubled_branch(
     rule = "have the period of the modulation"
     advice = "follow further doublings in the multipliers of this branch"
     require(branch.periods == 1, "branch", rule, f"{branch.periods} periods", advice)
-    follower, moving, problem = branch.origin
+    follower = branch.origin.follower
     simple = follower.finer(bifurcation.critical.point, INTERVALS)
     twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
     start = None
@@ -296,7 +295,8 @@ def doubled_branch(
     if start is None:
         rule, got = "have a doubled orbit next to it", "none by Newton's method"
         raise InputError("bifurcation", rule, got, "continue in another parameter")
-    return _followed(twice, start, moving, problem, most_steps, progress, periods=2)
+    origin = branch.origin._replace(follower=twice)
+    return _followed(origin, start, most_steps, progress, periods=2)
 
 
 def _doubled_line(line: ParameterLine) -> ParameterLine:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.arrays import between
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.orbit.mesh.arclength import ParameterLine, still
@@ -49,9 +50,7 @@ class ContinuedParameter:
 
     def value(self, t: Any) -> Any:
         """Values at the coordinates `t`."""
-        if self.logarithmic:
-            return self.start * (self.end / self.start) ** np.asarray(t)
-        return self.start + (self.end - self.start) * np.asarray(t)
+        return between(self.start, self.end, np.asarray(t), log=self.logarithmic)
 
 
 def moving_parameter(
@@ -70,8 +69,7 @@ def moving_parameter(
         rule = "be one that the equations have"
         raise InputError("parameter", rule, f"'{name}'", closest(name, known))
     parameter = known[name]
-    ends = [_end(parameter, end, field) for end in span]
-    start, end = ends
+    start, end = (_end(parameter, end, field) for end in span)
     require(start != end, field, "have two different ends", f"{start:g} twice", "give (start, end)")
     ratio = max(start, end) / min(start, end) if min(start, end) > 0 else 0.0
     return ContinuedParameter(

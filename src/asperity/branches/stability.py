@@ -107,7 +107,7 @@ def trace_boundary(
     plane: ParameterPlane,
     kind: Kind,
     first: BoundaryPoint,
-    report: Callable[[], None] = lambda: None,
+    report: Callable[[], None],
 ) -> TracedBoundary:
     """Follow a boundary from `first` in both directions."""
     halves = []
@@ -342,30 +342,22 @@ class StabilityBoundary(Displayed):
         """All curves along one dimension, with the number and kind of the curve of each point."""
         import xarray
 
-        counts = [len(c.x) for c in self.curves]
-
         def joined(values: list, units: str, name: str) -> tuple:
             flat = np.concatenate(values) if values else np.zeros(0)
-            return "point", flat, {"units": units, "long_name": name}
+            return "point", flat, {"units": units or "1", "long_name": name}
 
         curves = self.curves
-        units = [u or "1" for u in self.units]
-        data = {
-            "x": joined([c.x for c in curves], units[0], self.names[0]),
-            "y": joined([c.y for c in curves], units[1], self.names[1]),
-            "frequency": joined([c.frequency for c in curves], "Hz", "critical mode"),
-            "bounds_stability": joined(
-                [c.bounds_stability for c in curves], "1", "one side is stable"
-            ),
-            "curve": joined(
-                [np.full(n, i) for i, n in enumerate(counts)], "1", "number of the curve"
-            ),
-            "kind": joined(
-                [np.full(n, c.kind) for c, n in zip(curves, counts, strict=True)],
-                "1",
-                "kind of the bifurcation",
-            ),
+        about = {
+            "x": (self.units[0], self.names[0]),
+            "y": (self.units[1], self.names[1]),
+            "frequency": ("Hz", "critical mode"),
+            "bounds_stability": ("", "one side is stable"),
         }
+        data = {n: joined([getattr(c, n) for c in curves], *a) for n, a in about.items()}
+        numbers = [np.full(len(c.x), i) for i, c in enumerate(curves)]
+        kinds = [np.full(len(c.x), c.kind) for c in curves]
+        data["curve"] = joined(numbers, "", "number of the curve")
+        data["kind"] = joined(kinds, "", "kind of the bifurcation")
         return xarray.Dataset(data, attrs=equations_as_text(self.motion, self.fixed))
 
 
