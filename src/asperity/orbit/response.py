@@ -114,16 +114,12 @@ class PeriodicResponse(Drawn):
         def shaped(a: np.ndarray) -> np.ndarray:
             return np.moveaxis(a, -1, 0).reshape((*shape, *a.shape[:-1]))
 
+        names = ("mean_friction", "harmonics", "start", "iterations", "outcome", "detail")
         return cls(
-            mean_friction=shaped(solution.mean_friction),
+            **{name: shaped(getattr(solution, name)) for name in names},
             mu_ss=mu_ss,
-            harmonics=shaped(solution.harmonics),
             log_multipliers=without_lost_arguments(shaped(solution.log_multipliers)),
-            start=shaped(solution.start),
-            waveform=np.stack([shaped(solution.waveform[0]), shaped(solution.waveform[1])]),
-            iterations=shaped(solution.iterations),
-            outcome=shaped(solution.outcome),
-            detail=shaped(solution.detail),
+            waveform=np.stack([shaped(part) for part in solution.waveform]),
             motion=motion,
             load=load,
         )

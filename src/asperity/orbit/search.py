@@ -20,7 +20,7 @@ import numpy as np
 
 from asperity._processes import process_pool
 from asperity.errors import require
-from asperity.orbit.batches import run_chunks, take
+from asperity.orbit.batches import put, run_chunks, take
 from asperity.orbit.methods.branch_following import BranchFollowing
 from asperity.orbit.methods.collocation import Collocation
 from asperity.orbit.methods.fourier import Fourier
@@ -147,7 +147,6 @@ def find_orbits_on_cores(
     with process_pool(workers, "workers") as executor:
         results = executor.map(partial(find_orbits, options=silent, methods=methods), problems)
         for index, result in zip(slices, results, strict=True):
-            for target, values in zip(solution[:-1], result[:-1], strict=True):
-                target[..., index] = values
+            put(solution[:-1], index, result[:-1])
             options.progress(len(index))
     return solution

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import reduce
+from operator import attrgetter
 from typing import Any
 
 import equinox as eqx
@@ -43,13 +43,13 @@ def equation_parameters(motion: Motion, load: Modulation | None = None) -> dict[
 
 def value_of(problem: Problem, parameter: Parameter) -> Any:
     """Value of a parameter in SI, as the equations hold it: any shape."""
-    return _leaf(problem, parameter.path) / parameter.scale
+    return attrgetter(parameter.path)(problem) / parameter.scale
 
 
 def with_value(problem: Problem, parameter: Parameter, value: Any) -> Problem:
     """The problem with another value of one parameter, unchecked."""
     changed = np.asarray(value) * parameter.scale
-    return eqx.tree_at(lambda p: _leaf(p, parameter.path), problem, changed)
+    return eqx.tree_at(attrgetter(parameter.path), problem, changed)
 
 
 def equation_values(motion: Motion, load: Modulation | None = None) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def slider_values(slider: Slider) -> dict[str, Any]:
     """Parameters of the law, K, W0 and M by name, in SI and of any shape."""
     known = point_parameters(type(slider.law)).values()
     of_slider = (p for p in known if p.place in ("law", "slider"))
-    return {p.name: _leaf(slider, p.path.removeprefix("system.slider.")) for p in of_slider}
+    return {p.name: attrgetter(p.path.removeprefix("system.slider."))(slider) for p in of_slider}
 
 
 def law_from(law: type[Law], values: Any) -> Law:
@@ -103,10 +103,6 @@ def slider_from(law: type[Law], values: Any) -> Slider:
     """
     numbers = law_from(law, values)
     return Slider(numbers, spring=values["K"], load=values["W0"], mass=values.get("M", 0.0))
-
-
-def _leaf(owner: Any, path: str) -> Any:
-    return reduce(getattr, path.split("."), owner)
 
 
 def _shown(value: Any) -> str:

@@ -79,14 +79,7 @@ class ParametrisedProblem:
     @cached_property
     def load_names(self) -> tuple[str, ...]:
         """Names of the parameters of the load."""
-        if self.coefficients is None:
-            return ("epsilon",)
-        return tuple(
-            f"{series}_{function}_{k}"
-            for series, count in zip(_SERIES, self.coefficients, strict=True)
-            for k in range(1, count + 1)
-            for function in ("cos", "sin")
-        )
+        return load_names(self.coefficients)
 
     @property
     def optional(self) -> tuple[str, ...]:
@@ -174,16 +167,21 @@ def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
     return len(load.load), len(load.shear), len(load.pull)
 
 
+def load_names(coefficients: tuple[int, int, int] | None) -> tuple[str, ...]:
+    """Names of the parameters of a load, in the order of its numbers."""
+    if coefficients is None:
+        return ("epsilon",)
+    return tuple(
+        f"{series}_{function}_{k}"
+        for series, count in zip(_SERIES, coefficients, strict=True)
+        for k in range(1, count + 1)
+        for function in ("cos", "sin")
+    )
+
+
 def load_values(load: Modulation) -> dict[str, Any]:
     """Parameters of a load by name."""
-    if isinstance(load, Harmonic):
-        return {"epsilon": load.epsilon}
-    return {
-        f"{series}_{function}_{k}": value
-        for series in _SERIES
-        for k, pair in enumerate(getattr(load, series), start=1)
-        for function, value in zip(("cos", "sin"), pair, strict=True)
-    }
+    return dict(zip(load_names(coefficients_of(load)), jax.tree.leaves(load), strict=True))
 
 
 class ResponseValues(NamedTuple):
