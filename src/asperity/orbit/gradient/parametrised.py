@@ -23,7 +23,7 @@ from asperity.parameters import RULES, Parameter, law_parameters, point_paramete
 from asperity.parameters.arguments import typed
 from asperity.slider import Motion, QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.parameters import equation_parameters, slider_from, slider_values, with_value
+from asperity.slider.parameters import equation_parameters, slider_from, slider_values
 from asperity.slider.problem import Problem
 
 #: Series of a `Periodic` load, as the names of their coefficients begin.
@@ -136,16 +136,9 @@ class ParametrisedProblem:
     def directions(self, names: tuple[str, ...], points: int) -> Problem:
         """Derivatives of a problem by each of `names`, NumPy arrays (names, points)."""
         one = np.ones(points)
-        whole = jax.tree.map(np.asarray, self.problem(dict.fromkeys(self.names, one)))
-        none, known = jax.tree.map(np.zeros_like, whole), equation_parameters(*whole)
-        directions = []
-        for name in names:
-            if name in self.load_names:
-                unit = {n: one * (n == name) for n in self.load_names}
-                load = jax.tree.map(np.asarray, self._load(unit))
-                directions.append(none._replace(load=load))
-            else:
-                directions.append(with_value(none, known[name], one))
+        # The numbers of a problem are the parameters times constants.
+        _, push = jax.linearize(self.problem, dict.fromkeys(self.names, one))
+        directions = [push({n: one * (n == name) for n in self.names}) for name in names]
         return jax.tree.map(lambda *parts: np.stack(parts), *directions)
 
     def valid(self, parameters: Mapping[str, Array]) -> Array:
