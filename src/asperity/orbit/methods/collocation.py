@@ -18,7 +18,7 @@ from asperity.arrays import Bool, Complex, Float, Index
 from asperity.orbit.batches import mesh_chunk, points_of, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.mesh.equations import VANISHING_GROWTH, read_orbit, split_observables
-from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
+from asperity.orbit.mesh.mesh import GAUSS, Orbit, graded_mesh, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, MESHES, refined_orbit, remeshed, solve
 from asperity.orbit.observables import Observables, response_gap, waveform
 from asperity.orbit.outcome import Outcome
@@ -150,6 +150,21 @@ def _compare(
     return agreed
 
 
+def refined_where_resolved(
+    problem: Problem, options: SearchOptions, orbit: Orbit, index: Index
+) -> Solution:
+    """The solution of a problem by `refine`; an orbit that is not resolved may not exist.
+
+    Such a point is left to other methods.
+    """
+    solution = Solution.unsolved(problem, options)
+    refine(problem, solution, orbit, index, options)
+    solution.outcome[solution.outcome == Outcome.NOT_RESOLVED] = Outcome.NO_ORBIT
+    solution.detail[~solution.converged] = 0.0
+    options.progress(int(solution.converged.sum()))
+    return solution
+
+
 class Collocation(Method):
     """Collocation with Newton's method on the whole orbit."""
 
@@ -255,11 +270,11 @@ def _converted(problem: Problem, states: Array, slopes: Array, theta: Array) -> 
 def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
     """A quasi-static orbit as a first guess of another equation of motion, NumPy arrays."""
     theta = np.concatenate([orbit.mesh[None, :-1], orbit.stage_phases])
-    inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
-    shape = (len(inside), *theta.shape)
-    sliding = orbit.centre[:, None, None] + inside.reshape(shape)
-    converted = _converted(problem, sliding, slopes.reshape(shape), theta)
-    states, slopes = (np.asarray(a) for a in converted)
+    nodes = orbit.centre[:, None] + orbit.nodes
+    sliding = np.concatenate([nodes[:, None], orbit.stage_states], axis=1)
+    # Slopes at the nodes have no influence.
+    slopes = np.concatenate([np.zeros_like(nodes)[:, None], orbit.slopes], axis=1)
+    states, slopes = map(np.asarray, _converted(problem, sliding, slopes, theta))
     nodes = states[:, 0]
     # An interface that sticks has no finite logarithm of its slip rate.
     with np.errstate(invalid="ignore"):

@@ -7,12 +7,13 @@ import numpy as np
 
 from asperity._jax import jit_large
 from asperity.arrays import Float, Index
-from asperity.orbit.batches import mesh_chunk, run_chunks, take
+from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.arclength import ParameterLine, still
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import remeshed
 from asperity.orbit.methods.branch_following import followed_branches
-from asperity.orbit.methods.collocation import orbits_from_averaged_limit, refine
-from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
+from asperity.orbit.methods.collocation import orbits_from_averaged_limit, refined_where_resolved
+from asperity.orbit.outcome import WITHOUT_ORBIT
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import perturbation_rate
 from asperity.slider.problem import Problem
@@ -37,22 +38,18 @@ class FrequencyPath(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; an orbit that is not resolved may not exist, and is not reported."""
-        solution = Solution.unsolved(problem, options)
         faster = _faster(problem)
         origin = _at_frequency(problem, faster)
         orbit, rows = orbits_from_averaged_limit(origin, np.arange(len(faster)))
-        if len(rows):
-            part, origin, orbit = take((problem, origin, orbit), rows)
-            growth = eqx.tree_at(lambda q: q.system.omega, still(part), -np.log(faster[rows]))
-            line = ParameterLine(origin, still(part), growth)
-            branches = followed_branches(line, remeshed(origin, orbit, _INTERVALS), _MOST_STEPS)
-            attempt, arrived = Solution.unsolved(part, options), np.flatnonzero(branches.arrived)
-            refine(part, attempt, branches.pair.point.orbit, arrived, options)
-            attempt.outcome[attempt.outcome == Outcome.NOT_RESOLVED] = Outcome.NO_ORBIT
-            attempt.detail[~attempt.converged] = 0.0
-            solution.merge(rows, attempt)
-        options.progress(int(solution.converged.sum()))
-        return solution
+        if not len(rows):
+            return Solution.unsolved(problem, options)
+        part, origin, orbit = take((problem, origin, orbit), rows)
+        growth = eqx.tree_at(lambda q: q.system.omega, still(part), -np.log(faster[rows]))
+        line = ParameterLine(origin, still(part), growth)
+        branches = followed_branches(line, remeshed(origin, orbit, _INTERVALS), _MOST_STEPS)
+        reached = Orbit.empty(orbit.scheme, problem.system.size, _INTERVALS, len(faster))
+        put(reached, rows, branches.pair.point.orbit)
+        return refined_where_resolved(problem, options, reached, rows[branches.arrived])
 
 
 def _faster(problem: Problem) -> Float:

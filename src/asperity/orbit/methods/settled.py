@@ -17,8 +17,8 @@ from asperity.loads import Harmonic, Modulate, Programme
 from asperity.orbit.batches import put, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import FIRST_MESH
-from asperity.orbit.methods.collocation import refine
-from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
+from asperity.orbit.methods.collocation import refined_where_resolved
+from asperity.orbit.outcome import WITHOUT_ORBIT
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial
 from asperity.slider.inertial import StiffInertial
@@ -54,13 +54,8 @@ class SettledMotion(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; an orbit that is not resolved is left to other methods."""
-        solution = Solution.unsolved(problem, options)
-        orbit, rows = settled_orbits(problem, np.arange(len(solution.outcome)))
-        refine(problem, solution, orbit, rows, options)
-        solution.outcome[solution.outcome == Outcome.NOT_RESOLVED] = Outcome.NO_ORBIT
-        solution.detail[~solution.converged] = 0.0
-        options.progress(int(solution.converged.sum()))
-        return solution
+        points = np.arange(problem.system.V.shape[-1])
+        return refined_where_resolved(problem, options, *settled_orbits(problem, points))
 
 
 def settled_orbits(problem: Problem, index: Index, *, every: bool = False) -> tuple[Orbit, Index]:
