@@ -42,6 +42,21 @@ def test_the_age_obeys_the_law_of_ageing(law):
     assert period.plastic_velocity.mean() == pytest.approx(1.0, abs=1e-7)
 
 
+@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic"])
+def test_a_modulated_pull_moves_the_slider(law):
+    """dF/dt = K (V p - v) of the pulled spring, with p = 1 + 0.2 cos(wt)."""
+    material = asp.materials.load("bureau2000")
+    slider = asp.Slider(material.law(law), spring=material.K, load=material.W0)
+    modulation = asp.loads.modulated(EPSILON, pull=0.2)
+    response = asp.periodic_response(
+        slider, velocity=V, modulation=modulation, frequency=F, waveform=256, methods=("fourier",)
+    )
+    period = over_a_period(response)
+    stretching = 2 * np.pi * F * material.W0 / (material.K * V) * rate(period.force)
+    pull = 1 + 0.2 * np.cos(2 * np.pi * period.phase)
+    assert period.velocity == pytest.approx(pull - stretching, abs=1e-6)
+
+
 def test_no_age_where_the_law_has_none():
     material = asp.materials.load("bureau2000")
     slider = asp.Slider(material.law("amontons"), spring=material.K, load=material.W0)

@@ -64,10 +64,10 @@ def over_a_period(response: PeriodicResponse) -> Period:
 
     Notes
     -----
-    The slider's velocity is that of the pulling point less the rate of the spring's stretch,
-    dx/dt = V - (dF/dt)/K, by Fourier differentiation. The interface carries the spring's force less
-    what accelerates the slider and what it radiates; the state is the one at which the law carries
-    that force at that slip velocity.
+    The slider's velocity is that of the pulling point, V p with p = 1 unless the pull is modulated,
+    less the rate of the spring's stretch, (dF/dt)/K, by Fourier differentiation. The interface
+    carries the spring's force less what accelerates the slider and what it radiates; the state is
+    the one at which the law carries that force at that slip velocity.
     """
     samples, points = response.waveform.shape[-1], np.size(response.outcome)
     rule, got = "be of one point, with a waveform", f"{points} points of {samples} samples"
@@ -80,7 +80,8 @@ def over_a_period(response: PeriodicResponse) -> Period:
     slip = np.exp(log_slip)
     at = response.load.at(response.theta)
     elastic = bool(np.any(np.asarray(slider.law.elastic_length) > 0))
-    velocity = 1 - omega * W0 / (K * V) * _derivative(force) if elastic else slip
+    stretching = omega * W0 / (K * V) * _derivative(force)
+    velocity = np.asarray(at.pull) - stretching if elastic else slip
     friction = force - float(np.ravel(motion.damping)[0]) * velocity
     if "inertial" in motion.name:
         friction = friction - M * V * omega / W0 * _derivative(velocity)
