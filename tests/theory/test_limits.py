@@ -7,7 +7,7 @@ from scipy.integrate import quad
 
 import asperity as asp
 from asperity.laws import RiceRuina
-from asperity.loads import Harmonic
+from asperity.loads import Harmonic, modulated
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten
 from asperity.theory.limits import adiabatic_growth, adiabatic_states, even_phases
@@ -44,9 +44,12 @@ def test_growth_is_that_of_the_eigenvalues(stiffness, epsilon):
     assert exponent[0] == pytest.approx(growth(stiffness * KC, epsilon, 0.5), rel=1e-3, abs=1e-12)
 
 
-def test_states_are_steady_under_the_load_of_their_phase():
+@pytest.mark.parametrize("pull", [0.0, 0.3])
+def test_states_are_steady_under_the_load_and_at_the_pull_of_their_phase(pull):
     point = problem(0.7 * KC, 0.5, 0.5)
+    point = point._replace(load=modulated(0.5, pull=pull))
     states = adiabatic_states(point, nodes=24)
     at = point.load.at(even_phases(24) * jnp.ones(1))
     np.testing.assert_allclose(point.system.rates(states, at), 0.0, atol=1e-9)
-    np.testing.assert_allclose(point.system.log_slip(states, at), 0.0, atol=1e-12)
+    slip = np.log(1 + pull * np.cos(even_phases(24)))
+    np.testing.assert_allclose(point.system.log_slip(states, at), slip, atol=1e-12)

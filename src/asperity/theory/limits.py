@@ -173,7 +173,7 @@ def adiabatic_states(problem: Problem, *, nodes: int) -> Array:
     ones = jnp.ones((nodes, jnp.shape(system.V)[-1]))
     at = load.at(even_phases(nodes) * ones)
     law, pull = system.slider.law, at.pull * ones
-    friction = law.mu_ss(system.V) * ones
+    friction = law.mu_ss(system.V * pull)
     mechanical = system.mechanical_states(friction, pull, jnp.log(pull), at)
     return jnp.stack([state * ones for state in (*mechanical, *law.steady_state(system.V * pull))])
 
