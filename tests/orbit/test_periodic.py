@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from asperity import Slider, periodic_response
+from asperity import Slider, averaged_response, periodic_response
 from asperity.errors import InputError
 from asperity.laws import (
     Amontons,
@@ -387,6 +387,12 @@ def test_amontons_follows_the_load():
     assert response.multipliers.shape == (3, 0)
     assert response.converged.all()
     assert response.stable.all()
+
+
+def test_a_law_without_dynamics_has_no_limit_of_fast_modulation():
+    slider = Slider(Amontons(mu0=0.6), spring=K, load=W0)
+    with pytest.raises(InputError, match=r"law must depend on the velocity .* got amontons"):
+        averaged_response(slider, velocity=1e-6, epsilon=0.2)
 
 
 def test_other_units_change_nothing():

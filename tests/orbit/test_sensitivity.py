@@ -117,6 +117,16 @@ def test_every_derivative_agrees_with_differences(case, row):
     assert worst.max() < DIFFERENCES, dict(zip(numbers, worst.max(1), strict=True))
 
 
+def test_a_point_without_an_orbit_has_no_derivatives():
+    numbers = numbers_of("elasto-plastic", DRIVES["elasto-plastic"][0])
+    machine = slider("elasto-plastic", numbers)
+    result = sensitivities(machine, velocity=1e-6, epsilon=[0.24, 0.9995], frequency=120.0)
+    assert list(result.converged) == [True, False]
+    for output in (*SCALARS, "log_multipliers"):
+        assert np.isfinite(getattr(result, output)[0]).all()
+        assert np.isnan(getattr(result, output)[1]).all()
+
+
 def test_derivatives_to_the_mass_vanish_without_inertia(case):
     _, result = case
     at = result.parameters.index("M")

@@ -637,6 +637,7 @@ def sensitivities(
 
 def _outputs(values: ResponseValues, change: ResponseValues) -> Complex:
     """Derivatives of the outputs to one parameter, (points, outputs)."""
-    relative = change.harmonics / values.harmonics
+    with np.errstate(all="ignore"):  # NaN without an orbit, and where a harmonic vanishes
+        relative = change.harmonics / values.harmonics
     growth, turn = relative.real * np.abs(values.harmonics), relative.imag
     return np.column_stack([change.mean_friction, growth, turn, change.log_multipliers])

@@ -14,6 +14,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._processes import available_cores, process_count
+from asperity.errors import require
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation
 from asperity.orbit.outcome import Outcome
@@ -203,7 +204,7 @@ def averaged_response(
     Raises
     ------
     InputError
-        As `periodic_response`.
+        As `periodic_response`; if the law does not depend on the velocity.
 
     Examples
     --------
@@ -212,6 +213,8 @@ def averaged_response(
     >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
     >>> print(asp.averaged_response(slider, velocity="1 um/s", epsilon=[0.1, 0.2]).delta_mu)
     """
+    rule, got = "depend on the velocity to have a limit of fast modulation", slider.law.name
+    require(slider.law.rate_dependent, "law", rule, got, "take periodic_response at any frequency")
     V = DRIVE["V"].check(velocity)
     problem, shape = flatten(
         Problem(QuasiStatic(slider, V, np.asarray(1.0)), Harmonic(np.asarray(0.0)))
