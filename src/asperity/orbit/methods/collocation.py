@@ -270,10 +270,10 @@ def _converted(problem: Problem, states: Array, slopes: Array, theta: Array) -> 
 def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
     """A quasi-static orbit as a first guess of another equation of motion, NumPy arrays."""
     theta = np.concatenate([orbit.mesh[None, :-1], orbit.stage_phases])
-    nodes = orbit.centre[:, None] + orbit.nodes
-    sliding = np.concatenate([nodes[:, None], orbit.stage_states], axis=1)
+    left = orbit.centre[:, None] + orbit.nodes
+    sliding = np.concatenate([left[:, None], orbit.stage_states], axis=1)
     # Slopes at the nodes have no influence.
-    slopes = np.concatenate([np.zeros_like(nodes)[:, None], orbit.slopes], axis=1)
+    slopes = np.concatenate([np.zeros_like(left)[:, None], orbit.slopes], axis=1)
     states, slopes = map(np.asarray, _converted(problem, sliding, slopes, theta))
     nodes = states[:, 0]
     # An interface that sticks has no finite logarithm of its slip rate.
