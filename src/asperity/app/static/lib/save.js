@@ -27,6 +27,11 @@ export function csv(columns) {
   return [names.map(cell).join(","), ...rows].join("\n") + "\n";
 }
 
+/** Offer rows, records of numbers and texts, as a file of CSV; by default with the columns that any row has. */
+export function saveRows(name, rows, columns = [...new Set(rows.flatMap(Object.keys))]) {
+  saveFile(name, csv(Object.fromEntries(columns.map((n) => [n, rows.map((row) => row[n])]))), "text/csv");
+}
+
 /** Buttons that copy: a label, and a function that returns the text or a promise of it. */
 export function copies(...labelled) {
   return labelled.map(([label, text]) => el("button", {

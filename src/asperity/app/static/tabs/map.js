@@ -5,7 +5,7 @@ import { picture, stops } from "../lib/colours.js";
 import { choice, entry, group, inertiaTick, neededNumbers, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
 import { copies, copyLink, textsOf } from "../lib/save.js";
-import { Work } from "../lib/server.js";
+import { Task } from "../lib/task.js";
 import { digits, quantity, written } from "../lib/units.js";
 import { count, nameOf } from "../lib/words.js";
 
@@ -85,42 +85,26 @@ export function create(page) {
 
   function changed() {
     page.setLink(name, toParameters());
-    stop();
+    solving.stop();
     resting = setTimeout(start, REST);
   }
 
-  function stop() {
-    clearTimeout(resting);
-    solving.stop();
-    progress.hidden = true;
-    cancel.hidden = true;
-  }
-
-  const solving = new Work((why) => {
-    stop();
-    status.textContent = "";
-    message.textContent = why;
-  });
+  const solving = new Task("Progress of the map", { statusClass: "status", onEnd: () => clearTimeout(resting) });
+  const { status, message } = solving;
 
   async function start() {
     const solved = question();
-    message.textContent = "";
-    progress.hidden = false;
-    cancel.hidden = false;
-    progress.removeAttribute("value");
-    status.textContent = "Solving the first, coarse grid…";
+    solving.begin("Solving the first, coarse grid…");
     const done = await solving.run("map", solved, (part) => {
       if (part.waiting) status.textContent = "Waiting for another map to be done…";
-      if (part.progress !== undefined) progress.value = part.progress;
+      if (part.progress !== undefined) solving.bar.value = part.progress;
       if (!part.grid) return;
       grid = part.grid;
       shown = solved;
       draw();
       if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
     });
-    if (!done) return;
-    status.textContent = `${grid.count} × ${grid.count} points.`;
-    stop();
+    if (done) solving.end(`${grid.count} × ${grid.count} points.`);
   }
 
   // --- The figure ------------------------------------------------------------------------------
@@ -236,13 +220,6 @@ export function create(page) {
   // --- Controls --------------------------------------------------------------------------------
 
   const controls = el("form", { class: "controls", "aria-label": "Map", submit: (e) => e.preventDefault() });
-  const message = el("p", { class: "message", role: "alert" });
-  const status = el("p", { class: "status", role: "status" });
-  const progress = el("progress", { max: 1, "aria-label": "Progress of the map", hidden: true });
-  const cancel = el("button", {
-    type: "button", hidden: true,
-    click: () => { stop(); status.textContent = "Cancelled."; },
-  }, "Cancel");
 
   function buildControls() {
     const names = parametersOf(view.law).map((p) => [p.name, `${nameOf(p.name)} – ${p.meaning}`]);
@@ -313,7 +290,7 @@ export function create(page) {
         });
         results.append(
           el("div", { class: "summary" }, el("p", { class: "hint" }, "A click takes the point to Explore; with the keyboard, arrow keys and Enter."),
-            el("div", { class: "work" }, status, progress, cancel), message,
+            el("div", { class: "work" }, status, solving.bar, solving.cancel), message,
             el("div", { class: "actions" }, copies(copyLink, ...textsOf("map/text", question, (why) => { message.textContent = why; })))),
           figure.element);
       }
@@ -321,6 +298,6 @@ export function create(page) {
       buildControls();
       changed();
     },
-    hide: stop,
+    hide: () => solving.stop(),
   };
 }

@@ -3,9 +3,10 @@
 import { Figure, key, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity } from "../lib/controls.js";
 import { el, fill, fresh } from "../lib/dom.js";
-import { copies, copyLink, csv, saveFile } from "../lib/save.js";
+import { copies, copyLink, saveRows } from "../lib/save.js";
 import { Latest, Work } from "../lib/server.js";
 import { table } from "../lib/tables.js";
+import { Task } from "../lib/task.js";
 import { digits, quantity, written } from "../lib/units.js";
 import { elementDrawing } from "./paper/element.js";
 
@@ -27,7 +28,7 @@ export function create(page) {
 
   const latest = new Latest("paper/figure", answered, refused);
   const opening = new Work(refused);
-  const weighing = new Work((why) => { massStatus.textContent = ""; massBar.hidden = true; refused(why); });
+  const weighing = new Task("Progress of the curves with the mass of the slider", { statusClass: "status", onEnd: () => clearTimeout(resting) });
   const judging = new Work((why) => { ledgerMessage.textContent = why; });
   const message = el("p", { class: "message", role: "alert" });
   const controls = el("form", { class: "controls", "aria-label": "Figure and numbers", submit: (e) => e.preventDefault() });
@@ -35,13 +36,11 @@ export function create(page) {
   const ends = el("div", {});
   const figure = new Figure({ name: "paper-figure", title: "Figure", height: 460, columns: figureColumns });
   const drawing = el("div", { class: "element" });
-  const massStatus = el("p", { class: "status", role: "status" });
-  const massBar = el("progress", { max: 1, "aria-label": "Progress of the curves with the mass of the slider", hidden: true });
   const buttons = el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command]));
   const dock = new Dock();
   const figures = el("div", { class: "paper-figures" }, controls,
     el("div", { class: "results" },
-      el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), buttons), drawing, figure.element,
+      el("div", { class: "summary" }, sentence, message, weighing.message, el("div", { class: "work" }, weighing.status, weighing.bar), buttons), drawing, figure.element,
       el("section", { class: "law", tabindex: "0", "aria-label": "Numbers" }, el("h3", {}, "Values at the end of each curve"), ends)), dock.element);
   const ledgerView = el("div", { class: "ledger" });
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
@@ -116,27 +115,20 @@ export function create(page) {
   // --- Curves with the mass of the slider, which may take seconds ------------------------------------
 
   function stopMass() {
-    clearTimeout(resting);
-    weighing.stop();
+    weighing.end("");
     inertia = [];
-    massBar.hidden = true;
-    massStatus.textContent = "";
   }
 
   async function weigh() {
     stopMass();
-    massBar.hidden = false;
-    massBar.removeAttribute("value");
-    massStatus.textContent = "Computing the curves with the mass of the slider…";
+    weighing.begin("Computing the curves with the mass of the slider…");
     const done = await weighing.run("paper/inertia", question(), (part) => {
-      if (part.progress !== undefined) massBar.value = part.progress;
+      if (part.progress !== undefined) weighing.bar.value = part.progress;
       if (!part.curve) return;
       inertia.push(part);
       draw();
     });
-    if (!done) return;
-    massStatus.textContent = "";
-    massBar.hidden = true;
+    if (done) weighing.end("");
   }
 
   function refused(why) {
@@ -289,9 +281,7 @@ export function create(page) {
   }
 
   function saveLedger() {
-    const shown = shownClaims();
-    const names = ["id", "place", "kind", "statement", "stated", "computed", "verdict"];
-    saveFile("claims.csv", csv(Object.fromEntries(names.map((n) => [n, shown.map((c) => c[n])]))), "text/csv");
+    saveRows("claims.csv", shownClaims(), ["id", "place", "kind", "statement", "stated", "computed", "verdict"]);
   }
 
   async function computeLedger() {

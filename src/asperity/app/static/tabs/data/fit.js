@@ -3,9 +3,9 @@
 import { Figure, key, series } from "../../lib/charts.js";
 import { choice, textField, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
-import { copies, csv, saveFile } from "../../lib/save.js";
-import { Work } from "../../lib/server.js";
+import { copies, saveFile, saveRows } from "../../lib/save.js";
 import { sections } from "../../lib/tables.js";
+import { Task } from "../../lib/task.js";
 import { digits, written } from "../../lib/units.js";
 import { capital, ended, nameOf, names as chosenNames } from "../../lib/words.js";
 import { ByHand } from "./by_hand.js";
@@ -30,18 +30,13 @@ export class FitPanel {
     this.settings = { ...SETTINGS };
     this.form = el("form", { class: "fit-form", submit: (e) => { e.preventDefault(); this.start(); } });
     this.data = el("p", { class: "note" });
-    this.status = el("p", { class: "sentence", role: "status" });
-    this.message = el("p", { class: "message", role: "alert" });
+    this.task = new Task("Progress of the draws", { onEnd: () => { this.fitButton.disabled = false; } });
     this.results = el("div", { class: "card-body" });
     this.byHand = new ByHand(page, (start) => this.start(start), changed);
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
-    this.cancel = el("button", { type: "button", click: () => this.#end("Cancelled.") }, "Cancel");
-    this.cancel.hidden = true;
-    this.work = new Work((why) => this.#end("", why));
-    this.bar = el("progress", { max: 1, "aria-label": "Progress of the draws", hidden: true });
     this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
       el("h3", {}, "Fit and compare"), this.data, this.form, this.byHand.element,
-      el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.bar, this.message, this.results);
+      el("div", { class: "actions" }, this.fitButton, this.task.cancel), this.task.status, this.task.bar, this.task.message, this.results);
     this.element.hidden = true;
     this.#build();
   }
@@ -171,13 +166,14 @@ export class FitPanel {
   /** Fit or compare; `start` has start values by parameter. */
   async start(start = {}) {
     const { settings } = this;
-    this.#end("");
+    const { status, bar } = this.task;
+    this.task.end("");
     fill(this.results);
     const fixed = {};
     for (const line of settings.fixed.split(/[\n;]+/).filter((l) => l.trim())) {
       const [n, ...value] = line.split("=");
       if (!n.trim() || !value.join("=").trim()) {
-        this.message.textContent = `Fixed numbers must be NAME = VALUE, got “${line.trim()}”; write it like V = 1 um/s.`;
+        this.task.message.textContent = `Fixed numbers must be NAME = VALUE, got “${line.trim()}”; write it like V = 1 um/s.`;
         return;
       }
       fixed[n.trim()] = value.join("=").trim();
@@ -196,39 +192,23 @@ export class FitPanel {
       profile: settings.profile, inertia: settings.inertia,
     };
     if (settings.posterior) Object.assign(question, { posterior: true, draws: written(settings.draws), chains: written(settings.chains) });
-    this.#running(true);
-    this.status.textContent = "Fitting…";
-    const result = await this.work.run("data/fit", question, (part) => {
-      if (part.waiting) this.status.textContent = "Waiting for another fit…";
+    this.task.begin("Fitting…");
+    this.fitButton.disabled = true;
+    const result = await this.task.run("data/fit", question, (part) => {
+      if (part.waiting) status.textContent = "Waiting for another fit…";
       if (part.share !== undefined) {
-        this.bar.value = part.share;
-        this.status.textContent = `Fitting… ${Math.round(100 * part.share)} %.`;
+        bar.value = part.share;
+        status.textContent = `Fitting… ${Math.round(100 * part.share)} %.`;
       }
       if (part.draws !== undefined) {
-        this.bar.value = part.draws / part.of;
-        this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, warm-up included.` : "Sampling: starting the processes…";
+        bar.value = part.draws / part.of;
+        status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, warm-up included.` : "Sampling: starting the processes…";
       }
-      this.bar.hidden = part.draws === undefined && part.share === undefined;
-      if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
-      if (part.stage === "report") this.status.textContent = "Writing the report folder…";
+      bar.hidden = part.draws === undefined && part.share === undefined;
+      if (part.stage === "figures") status.textContent = "Drawing the figures…";
+      if (part.stage === "report") status.textContent = "Writing the report folder…";
     });
-    if (!result) return;
-    this.#running(false);
-    this.#draw(result);
-  }
-
-  #running(on) {
-    this.cancel.hidden = !on;
-    this.bar.hidden = true;
-    this.fitButton.disabled = on;
-  }
-
-  /** End the fit: its state, and why it was refused. */
-  #end(status, message = "") {
-    this.work.stop();
-    this.#running(false);
-    this.status.textContent = status;
-    this.message.textContent = message;
+    if (result) this.#draw(result);
   }
 
   #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, python, command }) {
@@ -241,7 +221,7 @@ export class FitPanel {
     if (fit?.converged) this.byHand.take(fit);
     // The first sentence of the report stands next to the button, then the picture, then the numbers.
     const [first, ...others] = described;
-    this.status.textContent = first.sentences.length ? first.sentences.map(ended).join(" ") : capital(first.title);
+    this.task.end(first.sentences.length ? first.sentences.map(ended).join(" ") : capital(first.title));
     const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw.map((s) => ({ ...s, title: s.title === n ? "" : s.title })), ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
@@ -333,7 +313,7 @@ export class FitPanel {
 
   #saveCsv(fits) {
     const rows = Object.entries(fits).flatMap(([law, f]) => Object.entries(f.parameters).map(([n, p]) => ({ law, parameter: n, value: p.value, se: p.se, low_95: p.interval_95[0], high_95: p.interval_95[1], unit: p.unit })));
-    saveFile("parameters.csv", csv(Object.fromEntries(Object.keys(rows[0]).map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
+    saveRows("parameters.csv", rows);
   }
 }
 

@@ -5,6 +5,7 @@ import { choice } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copies } from "../../lib/save.js";
 import { Work } from "../../lib/server.js";
+import { Task } from "../../lib/task.js";
 import { digits } from "../../lib/units.js";
 import { capital } from "../../lib/words.js";
 
@@ -24,16 +25,10 @@ export class ProtocolPanel {
       input: () => { this.#checkLater(); this.changed(); },
     });
     this.mistakes = el("div", { class: "mistakes", id: `${id}-mistakes`, role: "status" });
-    this.status = el("p", { class: "sentence", role: "status" });
-    this.message = el("p", { class: "message", role: "alert" });
-    this.bar = el("progress", { max: 1, "aria-label": "Progress of the run" });
-    this.bar.hidden = true;
+    this.task = new Task("Progress of the run");
     this.result = el("div", { class: "card-body" });
     this.runButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Run");
-    this.cancel = el("button", { type: "button", click: () => this.#end("Cancelled.") }, "Cancel");
-    this.cancel.hidden = true;
     this.checking = new Work((sentence) => this.#checked({ mistakes: [{ sentence, line: null }] }));
-    this.work = new Work((why) => this.#end("", why));
     this.chooser = el("div");
     this.figure = new Figure({
       name: "motion", title: "The motion", height: 420,
@@ -44,9 +39,9 @@ export class ProtocolPanel {
       el("p", { class: "note" }, "A protocol in TOML, as for asperity run: what slides, how it begins, the steps, and what records them."),
       this.chooser,
       el("div", { class: "choice" }, el("label", { for: id }, "Protocol"), this.text), this.mistakes,
-      el("div", { class: "actions" }, this.runButton, this.cancel,
+      el("div", { class: "actions" }, this.runButton, this.task.cancel,
         copies(["Copy as Python", () => PYTHON], ["Copy as command", () => "asperity run protocol.toml --out run.nc --record recording.csv"])),
-      this.status, this.bar, this.message, this.result);
+      this.task.status, this.task.bar, this.task.message, this.result);
     this.details.addEventListener("toggle", () => { if (this.protocols && this.details.open) { this.#check(); this.changed(); } });
     this.element = this.details;
   }
@@ -109,34 +104,22 @@ export class ProtocolPanel {
   }
 
   async start() {
-    this.message.textContent = "";
+    const { status, bar } = this.task;
     fill(this.result);
-    this.cancel.hidden = false;
-    this.bar.hidden = false;
-    this.bar.removeAttribute("value");
-    this.status.textContent = "Preparing…";
-    const result = await this.work.run("data/run", { text: this.text.value }, (part) => {
-      if (part.waiting) this.status.textContent = "Waiting for another run…";
+    this.task.begin("Preparing…");
+    const result = await this.task.run("data/run", { text: this.text.value }, (part) => {
+      if (part.waiting) status.textContent = "Waiting for another run…";
       if (part.reached !== undefined) {
-        this.bar.value = part.reached / part.duration;
-        this.status.textContent = `${digits(part.reached, 3)} s of ${digits(part.duration, 3)} s`;
+        bar.value = part.reached / part.duration;
+        status.textContent = `${digits(part.reached, 3)} s of ${digits(part.duration, 3)} s`;
       }
     });
     if (result) this.#draw(result);
   }
 
-  /** End the run: its state, and why it was refused. */
-  #end(status, message = "") {
-    this.work.stop();
-    this.cancel.hidden = true;
-    this.bar.hidden = true;
-    this.status.textContent = status;
-    this.message.textContent = message;
-  }
-
   #draw(result) {
     this.shown = result;
-    this.#end(result.stopped ? capital(result.stopped) : `Done: ${result.rows.toLocaleString("en")} rows.`);
+    this.task.end(result.stopped ? capital(result.stopped) : `Done: ${result.rows.toLocaleString("en")} rows.`);
     fill(this.result,
       result.stability && el("p", { class: "note" }, capital(result.stability)),
       el("div", { class: "actions" }, el("button", { type: "button", class: "primary", click: () => this.read({ id: result.id, name: result.name }) }, "Read this recording")),

@@ -3,9 +3,9 @@
 import { Figure, series } from "../../lib/charts.js";
 import { choice, textField, tick } from "../../lib/controls.js";
 import { el, fill } from "../../lib/dom.js";
-import { copies, csv, saveFile } from "../../lib/save.js";
-import { Work } from "../../lib/server.js";
+import { copies, saveFile, saveRows } from "../../lib/save.js";
 import { scrolling, sections, table } from "../../lib/tables.js";
+import { Task } from "../../lib/task.js";
 import { digits, quantity, withDoubt, written } from "../../lib/units.js";
 import { count, ended, names, typeset } from "../../lib/words.js";
 import { catalogue, stickSlip, stickSlipSentence } from "./stick_slip.js";
@@ -20,17 +20,13 @@ export class RecordingCard {
     this.recording = null;
     this.left = new Set(state.left || []); // rows that a fit leaves out
     this.fitted = state.fitted !== false;
-    this.status = el("p", { class: "sentence", role: "status" });
-    this.bar = el("progress", { max: 1, "aria-label": `Progress of ${this.state.name}` });
-    this.message = el("p", { class: "message", role: "alert" });
+    this.task = new Task(`Progress of ${this.state.name}`, { onRefused: (why) => this.#refused(why) });
     this.body = el("div", { class: "card-body" });
     this.forms = el("div", { class: "card-forms" });
     this.element = el("article", { class: "recording", tabindex: "-1", "aria-label": this.state.name },
       el("header", {}, el("h3", {}, this.state.name),
         el("button", { type: "button", class: "quiet", "aria-label": `Remove ${this.state.name}`, click: () => this.remove() }, "Remove")),
-      this.status, this.bar, this.message, this.forms, this.body);
-    this.bar.hidden = true;
-    this.work = new Work((why) => this.#refused(why));
+      this.task.status, this.task.bar, this.task.message, this.forms, this.body);
   }
 
   /** What a link holds: see `RecordingCard.restored`. */
@@ -72,30 +68,27 @@ export class RecordingCard {
   }
 
   remove() {
-    this.work.stop();
+    this.task.stop();
     this.removed();
   }
 
   async send(file) {
-    this.#says("Sending…");
-    this.bar.hidden = false;
-    const sent = await this.work.send("data/upload", file, (share) => { this.bar.value = share; });
+    this.task.begin("Sending…");
+    const sent = await this.task.work.send("data/upload", file, (share) => { this.task.bar.value = share; });
     if (!sent) return;
     this.state.key = sent.id;
     await this.measure();
   }
 
   async measure() {
-    this.message.textContent = "";
-    this.bar.hidden = false;
-    this.bar.removeAttribute("value");
+    this.task.begin("");
     this.#says("Reading…");
     const { source } = this.state;
     const { mode, ...options } = this.state.options;
     if (mode === "stick-slip") options.stick_slip = true;
     else if (mode && mode !== "auto") options.modulated = mode === "modulated";
     if (options.harmonics) options.harmonics = written(options.harmonics);
-    const result = await this.work.run("data/measure", { recording: this.state.key, source, options, names: names() }, (part) => {
+    const result = await this.task.run("data/measure", { recording: this.state.key, source, options, names: names() }, (part) => {
       if (part.waiting) this.#says("Waiting for another recording…");
       if (part.stage === "measuring") this.#says("Measuring…");
       if (part.recording) { this.recording = part.recording; this.#drawForms(); }
@@ -103,24 +96,23 @@ export class RecordingCard {
     if (!result) return;
     this.result = result;
     this.traced = null;
-    this.bar.hidden = true;
+    this.task.stop();
     this.#draw();
     this.changed();
   }
 
   #refused(why) {
-    this.bar.hidden = true;
     this.result = null;
     fill(this.body);
+    this.task.end("", why);
     this.#says("Not measured.", "bad");
-    this.message.textContent = why;
     if (this.state.key) this.#drawForms();
     this.changed();
   }
 
   #says(text, state = "") {
-    this.status.dataset.state = state;
-    this.status.textContent = text;
+    this.task.status.dataset.state = state;
+    this.task.status.textContent = text;
   }
 
   // --- Corrections -----------------------------------------------------------------------------
@@ -145,7 +137,7 @@ export class RecordingCard {
     const { recording } = this;
     const channels = recording ? [this.#channelTable(recording, again)] : [];
     const mode = options.mode || "auto";
-    fill(this.forms, el("details", { open: Boolean(open || !this.recording || this.message.textContent) },
+    fill(this.forms, el("details", { open: Boolean(open || !this.recording || this.task.message.textContent) },
       el("summary", {}, "Channels, units and options"),
       ...channels,
       el("form", { class: "filters", submit: (e) => e.preventDefault() },
@@ -380,10 +372,5 @@ function sparkline({ x, y }) {
   const holder = el("span", { class: "spark" });
   holder.innerHTML = `<svg width="120" height="24" viewBox="0 0 120 24" aria-hidden="true"><path d="${path}"/></svg>`;
   return holder;
-}
-
-function saveRows(name, rows) {
-  const names = [...new Set(rows.flatMap((r) => Object.keys(r)))];
-  saveFile(name, csv(Object.fromEntries(names.map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
 }
 
