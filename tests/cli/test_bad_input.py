@@ -538,6 +538,9 @@ def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> 
     ("options", "sentence"),
     [
         (("--window", "0:1", "--window", "1:2"), "--window must be given once"),
+        (("--window", "1:2 min"), "--window must carry a unit at each time, got '1' before"),
+        (("--steps", "1,2 min"), "--steps must carry a unit at each time, got '1' before '2 min'"),
+        (("--holds", "1:2 h"), "--holds must carry a unit at each time, got '1' before '2 h'"),
         (("--unit", "load=N", "--unit", "load=kN"), "--unit load must be given once, got 'N'"),
         (("--column", "W=load", "--load", "force"), "--column W must be given once"),
         (("--steps", "none.txt"), "--steps must be times or a file that can be read"),

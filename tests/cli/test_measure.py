@@ -9,6 +9,8 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.questions.options import measure_options
+from asperity.questions.recording import Measurement
 from references.commands import refused
 from references.populations import population
 
@@ -110,10 +112,23 @@ def test_columns_and_units_that_the_file_leaves_open(asperity, recording, tmp_pa
     assert abs(measurement["mu1"] - MU1) < 5 * measurement["uncertainties"]["mu1"]
 
 
-def test_windows_as_people_write_them(asperity, recording) -> None:
-    measurement = record(asperity("measure", recording, "--window", "4000 ms: 9", "--json"))
+@pytest.mark.parametrize("window", ["4000 ms: 9", "4:9 s"])
+def test_windows_as_people_write_them(asperity, recording, window) -> None:
+    measurement = record(asperity("measure", recording, "--window", window, "--json"))
     assert measurement["window"]["start"] == pytest.approx(4, abs=1e-6)
     assert measurement["window"]["end"] == pytest.approx(9, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fields", "options"),
+    [
+        ({"steps": (12.5, 60.0)}, ["--steps 12.5,60"]),
+        ({"window": (12.5, 60.0)}, ["--window 12.5:60"]),
+        ({"holds": ((1.0, 2.0),)}, ["--holds 1:2"]),
+    ],
+)
+def test_a_measurement_as_options(fields, options) -> None:
+    assert measure_options(Measurement(**fields), modulated=False)[1:] == options
 
 
 def test_an_exact_frequency_is_not_fitted(asperity, recording) -> None:

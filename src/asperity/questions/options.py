@@ -57,6 +57,8 @@ _UNITS = {
     "mass": "kg",
     "normal_load": "N",
 }
+#: Fields that are one span; in a list of spans each item is one.
+_SPANS = ("window", "stiffness_from")
 
 
 def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[str]:
@@ -82,7 +84,7 @@ def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[st
         else:
             # A number of the machine is a NAME=VALUE pair of an option, as in --set K=...
             option, _, key = option.partition(" ")
-            text = _text(value, _UNITS.get(name, ""))
+            text = _text(value, _UNITS.get(name, ""), span=name in _SPANS)
             parts.append(f"{option} {shlex.quote(f'{key}={text}' if key else text)}")
     return parts
 
@@ -96,15 +98,14 @@ def _pair(name: str, value: Any) -> str:
     return f"{name}={value}"
 
 
-def _text(value: Any, unit: str) -> str:
+def _text(value: Any, unit: str, *, span: bool) -> str:
     if isinstance(value, float):
         return f"{value!r} {unit}".rstrip() if unit else f"{value:.15g}"
     if not isinstance(value, list | tuple):
         return str(value)
-    numbers = [v for v in value if isinstance(v, float | int)]
-    if len(value) == len(numbers) == 2 and not unit:
+    if span:
         return ":".join("" if math.isinf(end) else f"{end:.15g}" for end in value)
-    return ",".join(_text(float(v) if v in numbers else v, unit) for v in value)
+    return ",".join(_text(v, unit, span=isinstance(v, list | tuple)) for v in value)
 
 
 def number_option(

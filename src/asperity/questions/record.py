@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
 
 import numpy as np
@@ -22,6 +23,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
+    WrapValidator,
 )
 
 from asperity.errors import InputError, Key, MistakesError, closest, one_of_types, require
@@ -236,6 +238,23 @@ def _seconds(value: Any) -> float:
     return number(value, "", "time")
 
 
+def _units_clear(times: Sequence[Any], like: str) -> None:
+    """Refuse texts of times like "1:2 min", whose unit may be meant for the first one too."""
+    texts = [time.strip() for time in times if isinstance(time, str) and time.strip("+-.0 ")]
+    for time, following in pairwise(texts):
+        unit = following.lstrip("+-.0123456789 ")
+        holds = time[-1].isalpha() or not unit.isalpha() or unit == "s"
+        got = f"'{time}' before '{following}'"
+        require(holds, "", "carry a unit at each time", got, f"write it like {like}")
+
+
+def _times(value: Any, converted: Callable[[Any], Any]) -> Any:
+    times = parts_of(value)
+    seconds = converted(times)
+    _units_clear(times, "1 min, 2 min")
+    return seconds
+
+
 def _span(value: Any) -> tuple[float, float]:
     """Both ends of a span; an end that a text leaves open is infinite."""
     if isinstance(value, str):
@@ -245,13 +264,14 @@ def _span(value: Any) -> tuple[float, float]:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
     first, last = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
+    _units_clear(value, "1 min:2 min")
     rising((first, last), "")
     return first, last
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 #: Times (s); a text has commas between them.
-Times = Annotated[tuple[Seconds, ...], BeforeValidator(parts_of)]
+Times = Annotated[tuple[Seconds, ...], WrapValidator(_times)]
 #: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
 Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 
