@@ -7,7 +7,7 @@ import contextlib
 import json
 import os
 import sys
-from collections.abc import AsyncGenerator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -106,11 +106,13 @@ class Jobs:
                 yield message or {"error": _why_it_ended(limits), "done": True}
         finally:
             # The client may be gone, and this task cancelled: another task takes over the worker.
-            task = asyncio.get_running_loop().create_task(
-                self._release(worker, reusable=not limits, finished=finished)
-            )
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+            self._start_task(self._release(worker, reusable=not limits, finished=finished))
+
+    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run a coroutine in the background; `close` waits for its end."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _idle_worker(self) -> _Worker | None:
         while self._idle:
@@ -143,9 +145,7 @@ class Jobs:
         self._alive.add(worker)
         self._idle.append(worker)
         if warm is not None:
-            task = asyncio.get_running_loop().create_task(self._warm(warm))
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+            self._start_task(self._warm(warm))
 
     async def _warm(self, job: str) -> None:
         async for _ in self.run(job, {}):

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Iterable
 from typing import Any
 
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -40,6 +40,14 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
 )
+#: Headers of every answer, besides the policies on content and frames.
+_HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-cache",
+}
 
 
 class Guard:
@@ -70,7 +78,9 @@ class Guard:
         self.origins = frozenset(f"http://{host}" for host in self.hosts)
         local = " ".join(f"http://{name}:*" for name in _NAMES[:2])
         ancestors = f"'self' {local}" if in_notebook else "'none'"
-        self.headers = _security_headers(ancestors, in_notebook)
+        self.headers = {**_HEADERS, "content-security-policy": _POLICY.format(ancestors=ancestors)}
+        if not in_notebook:
+            self.headers["x-frame-options"] = "DENY"
         self.body_limits = body_limits or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -83,8 +93,7 @@ class Guard:
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                kept = [(n, v) for n, v in message["headers"] if n.lower() != b"server"]
-                message["headers"] = kept + self.headers
+                MutableHeaders(scope=message).update(self.headers)
             await send(message)
 
         limit = self.body_limits.get(scope["path"], BODY_LIMIT)
@@ -96,16 +105,17 @@ class Guard:
         await self.app(scope, body, send_guarded)
 
     def _refusal(self, scope: Scope, limit: int) -> HTTPException | None:
-        hosts = list(_values(scope["headers"], b"host"))
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
         if len(hosts) != 1 or hosts[0].lower() not in self.hosts:
             return HTTPException(421, "the address must be that of this machine, such as localhost")
-        origins = list(_values(scope["headers"], b"origin"))
-        site = next(_values(scope["headers"], b"sec-fetch-site"), "same-origin")
+        other = [o for o in headers.getlist("origin") if o.lower() not in self.origins]
+        site = headers.get("sec-fetch-site", "same-origin")
         elsewhere = scope["path"].startswith("/api/") and site not in ("same-origin", "none")
-        if elsewhere or any(origin.lower() not in self.origins for origin in origins):
+        if elsewhere or other:
             text = "a request must come from the page itself, not from another site"
             return HTTPException(403, text)
-        length = next(_values(scope["headers"], b"content-length"), "0")
+        length = headers.get("content-length", "0")
         if not length.isdecimal() or len(length) > 20 or int(length) > limit:
             return _too_large(limit)
         return None
@@ -215,21 +225,3 @@ class Connection(H11Protocol):
 def sentence(refusal: HTTPException) -> JSONResponse:
     """The answer to a refused request: one sentence with the reason."""
     return JSONResponse({"error": refusal.detail}, refusal.status_code, refusal.headers)
-
-
-def _values(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> Any:
-    return (value.decode("latin-1") for key, value in headers if key.lower() == name)
-
-
-def _security_headers(ancestors: str, in_notebook: bool) -> list[tuple[bytes, bytes]]:
-    headers = {
-        "content-security-policy": _POLICY.format(ancestors=ancestors),
-        "x-content-type-options": "nosniff",
-        "referrer-policy": "no-referrer",
-        "cross-origin-opener-policy": "same-origin",
-        "cross-origin-resource-policy": "same-origin",
-        "cache-control": "no-cache",
-    }
-    if not in_notebook:
-        headers["x-frame-options"] = "DENY"
-    return [(name.encode(), value.encode()) for name, value in headers.items()]

@@ -16,7 +16,7 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.report import Output, say
-from asperity.errors import require, symbol, symbols
+from asperity.errors import require, symbol
 from asperity.parameters.arguments import number, one_of
 
 if TYPE_CHECKING:
@@ -77,14 +77,8 @@ def air(
     one, count = inverse is None or len(frequencies) == 1, len(frequencies)
     require(one, "--inverse", "have one frequency", count, "call once for each")
     unknown, given = {"radius": "R", "gap": "h0"}.get(sought or "", ""), settings_of(settings)
-    rule = f"be left out with --for {sought}"
-    require(
-        unknown not in given,
-        f"--set {symbol(unknown)}",
-        rule,
-        f"'{given.get(unknown)}'",
-        "it is sought",
-    )
+    field, got = f"--set {symbol(unknown)}", f"'{given.get(unknown)}'"
+    require(unknown not in given, field, f"be left out with --for {sought}", got, "it is sought")
     numbers = _numbers(given, material_named(material), vacuum, unknown)
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
     layer = None
@@ -104,34 +98,25 @@ def _numbers(
     """SI values of the parameters; the sought parameter need not be known."""
     from asperity.air.layer import LAYER
     from asperity.air.normal_contact import LAMBDA_Z
+    from asperity.operating_point import without_numbers
     from asperity.parameters import MACHINE
 
     layer = {p.argument: p for p in LAYER.values()}
     contact = {n: MACHINE[n] for n in ("W0", "M")} | {"lambda_z": LAMBDA_Z}
     known = contact if vacuum else layer | contact
+    numbers = {}
     for name, text in given.items():
-        rule = "not be given with --vacuum"
-        require(
-            not (vacuum and name in layer),
-            f"--set {symbol(name)}",
-            rule,
-            f"'{text}'",
-            "leave one out",
-        )
+        field, apart = f"--set {symbol(name)}", not (vacuum and name in layer)
+        require(apart, field, "not be given with --vacuum", f"'{text}'", "leave one out")
         one_of(symbol(name), map(symbol, known), "--set")
-    numbers = {
-        name: number(text, f"--set {symbol(name)}", known[name].kind, "positive")
-        for name, text in given.items()
-    }
+        numbers[name] = number(text, field, known[name].kind, "positive")
     for name, parameter in known.items():
         published = parameter.name
         if name not in (*numbers, unknown) and material is not None and published in material:
             numbers[name] = material[published].si
     missing = [name for name in known if name not in (*numbers, unknown)]
     if missing:
-        example = f"{symbol(missing[0])}={known[missing[0]].example}"
-        advice = f'name a material that has them or give each one, like --set "{example}"'
-        require(False, "air", "have all its numbers", f"none for {symbols(missing)}", advice)
+        raise without_numbers("air", missing, known)
     return numbers
 
 

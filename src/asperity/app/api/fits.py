@@ -8,7 +8,8 @@ import math
 import shlex
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
@@ -98,6 +99,11 @@ class Fitted(Question, FitOptions):
     report: StrictBool = False
     names: Names = "friction"
 
+    @property
+    def sampling(self) -> dict[str, int]:
+        """Settings of the posterior."""
+        return {"chains": self.chains, "draws": self.draws, "seed": self.seed}
+
 
 def check(question: Fitted) -> None:
     """Raise `InputError` for what cannot be fitted, before a process is started."""
@@ -157,11 +163,9 @@ def _fit(
     report(share=0.0)
     options = {name: getattr(question, name) for name in FitOptions.model_fields}
     record: dict[str, Any]
-    with (
-        tempfile.TemporaryDirectory(prefix="asperity-page-") as folder,
-        naming(files=_names(data := _data(question, files, Path(folder)))),
-    ):
-        options["data"] = data
+    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder, ExitStack() as named:
+        data = options["data"] = _data(question, files, Path(folder))
+        named.enter_context(naming(files={Path(one["file"]): one["name"] for one in data}))
         if len(question.laws) == 1:
             one = questions.Fit(**{**options, "law": question.laws[0]})
             whole: Any = answer_fit(one, read=_read, progress=on_progress)
@@ -181,13 +185,8 @@ def _fit(
     posterior = None
     if best is not None and best.converged:
         if question.posterior:
-            posterior = sample_posterior(
-                best,
-                chains=question.chains,
-                draws=question.draws,
-                seed=question.seed,
-                progress=lambda done, total: report(draws=done, of=total),
-            )
+            on_draws = lambda done, total: report(draws=done, of=total)  # noqa: E731
+            posterior = sample_posterior(best, **question.sampling, progress=on_draws)
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
             record["sections"] += records(posterior_sections(posterior))
         report(stage="figures")
@@ -221,11 +220,6 @@ def _data(
         fields = run.model_dump(exclude={"recording"}, exclude_none=True)
         data.append({**fields, "file": file["path"], "name": file["name"]})
     return data
-
-
-def _names(data: Iterable[Mapping[str, Any]]) -> dict[Path, str]:
-    """The user's names of files, by their paths on the server."""
-    return {Path(file["file"]): file["name"] for file in data}
 
 
 def _read(data: Any) -> Any:
@@ -378,7 +372,7 @@ def _python(
         "print(result)",
     ]
     if question.posterior:
-        sizes = f"chains={question.chains}, draws={question.draws}, seed={question.seed}"
+        sizes = ", ".join(f"{name}={value}" for name, value in question.sampling.items())
         lines.append(f"print(sample_posterior(result, {sizes}))")
     return "\n".join(lines) + "\n"
 
@@ -387,19 +381,15 @@ def _command(question: Fitted, chosen: Mapping[str, Any], files: list[str]) -> s
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
     parts += [f"--law {law}" for law in question.laws]
-    of_run: dict[str, Any] = {}
-    if question.runs:
-        # Recordings may have different options; the command shows those of the first recording.
-        run = question.runs[0]
+    # Recordings may have different options; the command shows those of the first recording.
+    for run in question.runs[:1]:
         parts += source_options(run.source)
-        of_run = {name: getattr(run, name) for name in ("window", "steps", "velocities")}
-    parts += as_options({**chosen, **of_run}, FIT_OPTIONS)
+        chosen = {**chosen, **run.model_dump(include={"window", "steps", "velocities"})}
+    parts += as_options(chosen, FIT_OPTIONS)
     if question.posterior:
         parts.append("--posterior")
-        sampling = ("chains", "draws", "seed")
-        defaults = {name: Fitted.model_fields[name].default for name in sampling}
-        numbers = {name: getattr(question, name) for name in sampling}
-        parts += [f"--{n} {v}" for n, v in numbers.items() if v != defaults[n]]
+        usual = {name: Fitted.model_fields[name].default for name in question.sampling}
+        parts += [f"--{n} {v}" for n, v in question.sampling.items() if v != usual[n]]
     if question.report:
         parts.append("--report report")
     return " ".join(parts)

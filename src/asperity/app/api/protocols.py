@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from asperity.errors import InputError, closest, require
 from asperity.laws import registered
 from asperity.materials.material import packaged
@@ -22,7 +24,7 @@ from asperity.protocol import (
     ProtocolError,
     outline,
     record_run,
-    run_protocol as run_to_file,
+    run_protocol,
     write_csv,
 )
 
@@ -81,7 +83,6 @@ def run(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     report : callable
         Called with ``reached`` and ``duration`` (s).
     """
-    from asperity.protocol.run import stability_statement
     from asperity.recording.writers import write
 
     out = Path(argument["path"])
@@ -89,43 +90,35 @@ def run(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     protocol, mistakes = checked(argument["text"])
     if protocol is None:
         raise InputError(mistakes[0]["sentence"])
-    _check_size(protocol)
+    size = (protocol.rows or 0) * protocol.row_bytes
+    rule = f"leave at most {size_text(_LARGEST_MOTION)} of motion for the page"
+    advice = "lower it, shorten the steps, or use asperity run"
+    require(size <= _LARGEST_MOTION, "solver.sampling", rule, size_text(size), advice)
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
         motion = Path(folder) / "motion.nc"
 
         def on_progress(reached: float, end: float) -> None:
             report(reached=float(reached), duration=float(end))
 
-        done = run_to_file(protocol, motion, progress=on_progress)
+        done = run_protocol(protocol, motion, progress=on_progress)
         shown = outline(motion, _SHOWN)
         if protocol.setup is None:
             write_csv(motion, out)
         else:
             write(record_run(protocol.setup, motion), out)
-    time = shown.time
+    time = np.repeat(shown.time, 2)
     return {
         "id": argument["id"],
         "name": argument["name"],
         "stopped": done.stopped,
-        "stability": stability_statement(protocol) or "",
+        "stability": done.unstable_start,
         "rows": done.rows,
         "events": shown.events[:500],
         "curves": {
-            name: {
-                "x": [t for t in time for _ in (0, 1)],
-                "y": [v for pair in zip(shown.low[name], shown.high[name], strict=True)
-                      for v in pair],
-            }
+            name: {"x": time, "y": np.stack([shown.low[name], shown.high[name]], axis=1).ravel()}
             for name in ("load", "force", "velocity")
         },
-    }  # fmt: skip
-
-
-def _check_size(protocol: Protocol) -> None:
-    size = (protocol.rows or 0) * protocol.row_bytes
-    rule = f"leave at most {size_text(_LARGEST_MOTION)} of motion for the page"
-    advice = "lower it, shorten the steps, or use asperity run"
-    require(size <= _LARGEST_MOTION, "solver.sampling", rule, size_text(size), advice)
+    }
 
 
 def _files_named(content: dict[str, Any]) -> Iterator[InputError]:
