@@ -21,7 +21,7 @@ from asperity.cli.options import (
     stacked,
     switch,
 )
-from asperity.cli.recording import listed_times, source_options, velocities_option
+from asperity.cli.recording import source_options, times_option, velocities_option
 from asperity.cli.report import Output, say
 from asperity.cli.words import fields_as_options
 from asperity.errors import InputError, require
@@ -91,7 +91,7 @@ def _field(name: str) -> Any:
 
 #: Options of data and estimation: the most used ones, then the others.
 _FIRST = (
-    option("--window", "START:END", "Seconds of a recording to fit."),
+    field_option("asperity.questions.fit:Data", "window", "START:END"),
     _field("free"),
     option("--fix fixed", "NAME=VALUE", 'Fix a number, like "D0=5 um"; repeatable.', multiple=True),
     option("--start", "NAME=VALUE", "Start value of a free parameter; repeatable.", multiple=True),
@@ -104,10 +104,8 @@ _FIRST = (
     ),
 )
 _THEN = (
-    option(
-        "--steps",
-        "TIMES|FILE",
-        "Times (s) at which the velocity of the drive changes, where no channel has it.",
+    times_option(
+        "--steps", "Times (s) at which the velocity of the drive changes, where no channel has it."
     ),
     velocities_option,
     *(_field(n) for n in ("stiffness_from", "trend", "drift", "initial", "gauge", "gauge_order")),
@@ -133,9 +131,6 @@ def _question_options(*further: Decorator) -> Decorator:
             fixed: tuple[str, ...],
             start: tuple[str, ...],
             prior: tuple[str, ...],
-            window: str | None,
-            steps: str | None,
-            velocities: str | None,
             report: Path | None,
             output: Output,
             **others: Any,
@@ -143,11 +138,7 @@ def _question_options(*further: Decorator) -> Decorator:
             from asperity.questions.options import FIT_OPTIONS
 
             with fields_as_options(FIT_OPTIONS):
-                of_run = {
-                    "window": window,
-                    "steps": None if steps is None else listed_times(steps, "--steps"),
-                    "velocities": velocities,
-                }
+                of_run = {name: others.pop(name) for name in ("window", "steps", "velocities")}
                 fields = {
                     "data": [{"file": path, "source": source, **of_run} for path in data],
                     "fixed": settings_of(fixed, "--fix"),

@@ -22,7 +22,7 @@ from asperity.cli.options import (
     settings_of,
     switch,
 )
-from asperity.cli.recording import listed_times, source_options, velocities_option
+from asperity.cli.recording import source_options, times_option, velocities_option
 from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require, symbol, symbols
@@ -134,15 +134,13 @@ in place of numbers; 2: bad input.
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @output_options(plot=True)
 @field_option(_QUESTION, "window", "START:END")
-@option(
+@times_option(
     "--steps",
-    "TIMES|FILE",
     "Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
 )
 @velocities_option
-@option(
+@times_option(
     "--holds",
-    "TIMES|FILE",
     "Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @source_options
@@ -153,12 +151,14 @@ in place of numbers; 2: bad input.
 @field_option(_QUESTION, "detrend", "")
 @switch("--amplitudes", "Read every modulated stretch, and print them as a table.")
 @switch(
-    "--no-modulation",
+    "--no-modulation modulated",
     "Velocity steps and holds; by default, those of a recording whose load is constant.",
+    value=False,
 )
 @switch(
     "--stick-slip",
     "Slip events; by default, those of a recording that is stick-slip and not modulated.",
+    value=True,
 )
 @set_option(
     '--set "K=168 N/m" --set "V=42 um/s"',
@@ -190,11 +190,6 @@ in place of numbers; 2: bad input.
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
-    no_modulation: bool,
-    steps: str | None,
-    velocities: str | None,
-    holds: str | None,
-    stick_slip: bool,
     settings: tuple[str, ...],
     law: str | None,
     material: str | None,
@@ -218,17 +213,11 @@ def measure(
 
     if fields["frequency"] == "auto":
         fields["frequency"] = None
-    fields |= {
-        "modulated": False if no_modulation else None,
-        "steps": None if steps is None else listed_times(steps, "--steps"),
-        "velocities": velocities,
-        "holds": None if holds is None else listed_times(holds, "--holds"),
-        "stick_slip": True if stick_slip else None,
-    }
     given = settings_of(settings)
     known = {name: value for name, value in fields.items() if value is not None}
     question = Question(**known, **_machine(given, law is None))
     plot, count, one = output.plot, len(recordings), "leave one out"
+    stick_slip, listed = question.stick_slip, question.steps or question.holds
     drawn = not (law or material) or (out and plot and stick_slip)
     rule, advice = (
         "go with --out, --stick-slip and --plot",
@@ -237,7 +226,7 @@ def measure(
     require(drawn, "--law and --material", rule, "them without", advice)
     apart = not (stick_slip and amplitudes)
     require(apart, "--stick-slip", "go without --amplitudes", "both", one)
-    several = not out or not ((plot and not stick_slip) or events or steps or holds)
+    several = not out or not ((plot and not stick_slip) or events or listed)
     options, rule = "--plot, --events, --steps and --holds", "go with one recording without --out"
     advice = "measure that recording by itself, or draw a campaign of --stick-slip"
     require(several, options, rule, "both", advice)
@@ -245,9 +234,9 @@ def measure(
     require(out or count == 1, "--out", rule, f"{count} without", advice)
     table, options = out or not (resume or jobs or thresholds), "--resume, --jobs and --thresholds"
     require(table, options, "go with --out", "no table", "name it or leave them out")
-    alone = not (amplitudes and no_modulation)
+    alone = not amplitudes or fields["modulated"] is None
     require(alone, "--amplitudes", "go without --no-modulation", "both", one)
-    alone = not amplitudes or not (events or steps or holds)
+    alone = not amplitudes or not (events or listed)
     rule = "go without --events, --steps and --holds"
     require(alone, "--amplitudes", rule, "both", one)
     rows_of = _file_rows(recordings, source, question, conditions)

@@ -119,9 +119,16 @@ def option(names: str, metavar: str | None, about: str, kind: Any = None, **more
     return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
 
 
-def switch(names: str, about: str) -> Decorator:
-    """An option without a value; parameters as for `option`."""
-    return click.option(*names.split(), is_flag=True, help=about)
+def switch(names: str, about: str, value: bool | None = None) -> Decorator:
+    """An option without a value; parameters as for `option`.
+
+    Parameters
+    ----------
+    value : bool, optional
+        What the command gets with the option, which is then None without it; else True and False.
+    """
+    look = {} if value is None else {"flag_value": value, "default": None}
+    return click.option(*names.split(), is_flag=True, help=about, **look)
 
 
 def field_option(record: str, field: str, metavar: str | None = None, short: str = "") -> Decorator:

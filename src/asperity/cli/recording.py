@@ -7,16 +7,32 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from asperity.cli.options import Command, add_setting, option, pairs_of, stacked
+from asperity.cli.options import (
+    Command,
+    Decorator,
+    add_setting,
+    field_option,
+    option,
+    pairs_of,
+    stacked,
+)
 from asperity.errors import InputError, require
 
+_QUESTIONS = "asperity.questions.recording"
 #: Velocities for recordings without a channel of the motion of the drive.
-velocities_option = option(
-    "--velocities", "VALUES", 'Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.'
-)
+velocities_option = field_option(f"{_QUESTIONS}:Measurement", "velocities", "VALUES")
 
 
-def listed_times(text: str, option: str) -> list[str]:
+def times_option(name: str, about: str) -> Decorator:
+    """An option of times or spans; the command gets the list of their texts."""
+
+    def listed(context: Any, option: Any, text: str | None) -> list[str] | None:
+        return None if text is None else _listed_times(text, name)
+
+    return option(name, "TIMES|FILE", about, callback=listed)
+
+
+def _listed_times(text: str, option: str) -> list[str]:
     """Items of a list like ``12.5,60`` or ``100:110,200:300``, or lines of a file.
 
     Raises
@@ -42,6 +58,16 @@ def listed_times(text: str, option: str) -> list[str]:
     return result
 
 
+#: Options with the name of their field of the source, with their metavar.
+_FIELDS = {
+    "area": "VALUE",
+    "rate": "VALUE",
+    "recipe": "TOML",
+    "group": "NAME",
+    "format": "NAME",
+    "delimiter": "SIGN",
+    "decimal": "SIGN",
+}
 _OPTIONS = (
     option("--load", "NAME", "Column of the normal load; by default recognised by name and unit."),
     option("--force", "NAME", "Column of the shear force; by default recognised by name and unit."),
@@ -58,22 +84,14 @@ _OPTIONS = (
         "Unit of a column that the file leaves open, like Fn=N; repeatable.",
         multiple=True,
     ),
-    option("--area", "VALUE", 'Area that turns stresses into forces, like "25 cm^2".'),
-    option("--rate", "VALUE", 'Samples per second, like "10 kHz", in place of times.'),
     option(
         "--channel channels",
         "NAME=EXPRESSION",
         'A channel made of others, like "load = Conf.Press - Pore.Press"; repeatable.',
         multiple=True,
     ),
-    option("--recipe", "TOML", "Reduction file: columns, units and channels.", Path),
-    option("--group", "NAME", "Group in an HDF5, MATLAB or TDMS file with several groups."),
-    option("--format", "NAME", "Format of the file, or name of a reader."),
-    option("--delimiter", "SIGN", "Delimiter of a text: a character, tab or blank."),
-    option("--decimal", "SIGN", "Decimal mark of a text: . or ,"),
+    *(field_option(f"{_QUESTIONS}:Source", name, metavar) for name, metavar in _FIELDS.items()),
 )
-#: Options with the name of their field of the source.
-_FIELDS = ("rate", "group", "area", "recipe", "format", "delimiter", "decimal")
 
 
 def source_options(command: Command) -> Command:

@@ -36,7 +36,7 @@ class Data(Record):
     source : Source
         How a recording is read.
     window : (float, float), optional
-        First and last time (s) of the samples that are fitted.
+        Seconds of a recording that are fitted, like 100:400.
     steps : tuple of float, optional
         Times (s) at which the velocity of the drive changes.
     velocities : tuple of float, optional

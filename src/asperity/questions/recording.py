@@ -40,9 +40,15 @@ class ReadingRecipe(Question):
     channels : dict of str to str
         Expressions of derived channels, in their order.
     rate : float or str, optional
-        Samples per second.
-    group, delimiter, decimal, format : str, optional
-        As in `asperity.read`.
+        Samples per second, like "10 kHz", in place of times.
+    group : str, optional
+        Group in an HDF5, MATLAB or TDMS file with several groups.
+    delimiter : str, optional
+        Delimiter of a text: a character, tab or blank.
+    decimal : str, optional
+        Decimal mark of a text: . or ,
+    format : str, optional
+        Format of the file, or name of a reader.
     """
 
     subject = "recipe"
@@ -65,9 +71,9 @@ class Source(ReadingRecipe):
     Attributes
     ----------
     recipe : Path, optional
-        A reduction file, whose fields apply where this record has none.
+        Reduction file, whose columns, units and channels apply where no others are given.
     area : str or float, optional
-        Contact area, which makes stresses forces.
+        Area that turns stresses into forces, like "25 cm^2".
     """
 
     subject = "read"
@@ -131,7 +137,7 @@ class Measurement(Question):
     steps : tuple of float, optional
         Times (s) of the velocity steps of a recording without modulation.
     velocities : tuple of float, optional
-        Velocities of the drive between the steps (m/s), 0 in a hold; measured by default.
+        Velocities between the steps (m/s), like "1 um/s,10 um/s", 0 in a hold; measured by default.
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
     stick_slip : bool, optional
