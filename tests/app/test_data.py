@@ -639,6 +639,10 @@ def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, bar
     fit.get_by_role("button", name="Fit", exact=True).click()
     fit.get_by_role("button", name="Cancel").click()
     fit.get_by_text("Cancelled.").wait_for()
+    # Priors without a material would have no effect.
+    form.get_by_label("Published uncertainties as priors").check()
+    fit.get_by_role("button", name="Fit", exact=True).click()
+    fit.locator(".message", has_text="priors must come from a material, got none").wait_for()
 
 
 def test_velocities_are_given_where_no_channel_has_the_motion(visit, barriers, stepped):

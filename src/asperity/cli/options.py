@@ -127,7 +127,7 @@ def switch(names: str, about: str, value: bool | None = None) -> Decorator:
     value : bool, optional
         What the command gets with the option, which is then None without it; else True and False.
     """
-    look = {} if value is None else {"flag_value": value, "default": None}
+    look: dict[str, Any] = {} if value is None else {"flag_value": value, "default": None}
     return click.option(*names.split(), is_flag=True, help=about, **look)
 
 

@@ -238,7 +238,7 @@ def _seconds(value: Any) -> float:
     return number(value, "", "time")
 
 
-def _units_clear(times: Sequence[Any], like: str) -> None:
+def _units_clear(times: Iterable[Any], like: str) -> None:
     """Refuse texts of times like "1:2 min", whose unit may be meant for the first one too."""
     texts = [time.strip() for time in times if isinstance(time, str) and time.strip("+-.0 ")]
     for time, following in pairwise(texts):

@@ -178,6 +178,10 @@ export class FitPanel {
       }
       fixed[n.trim()] = value.join("=").trim();
     }
+    if (settings.prior && !settings.material) {
+      this.task.message.textContent = `${this.page.catalogue.labels.prior} must come from a material, got none; choose it under “Other numbers from”.`;
+      return;
+    }
     const question = {
       laws: settings.laws, free: this.#freed(),
       rows: this.rows(), tables: this.tables(), fixed, start,
@@ -188,7 +192,7 @@ export class FitPanel {
         fit_rate: settings.fit_rate || null,
       }),
       report: settings.report, names: chosenNames(),
-      material: settings.material || null, prior: settings.prior ? settings.material || null : null,
+      material: settings.material || null, prior: settings.prior ? settings.material : null,
       profile: settings.profile, inertia: settings.inertia,
     };
     if (settings.posterior) Object.assign(question, { posterior: true, draws: written(settings.draws), chains: written(settings.chains) });
