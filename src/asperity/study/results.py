@@ -6,12 +6,15 @@ import contextlib
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from zarr.abc.buffer import Buffer, BufferPrototype
+from zarr.abc.store import ByteRequest
+from zarr.storage import LocalStore, WrapperStore
 
 from asperity.errors import InputError, require
 from asperity.outputs import output_file, require_disk, written_file
@@ -70,7 +73,8 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     """The dataset of a finished or unfinished sweep, with labels and units; loaded on access.
 
     Every chunk that is done is compared with its checksum before, which takes as long as reading
-    the store. `xarray.open_zarr` gives the same dataset without this check.
+    the store. Points of the other chunks are NaN, their outcome -1. `xarray.open_zarr` gives the
+    same dataset of a finished sweep without this check.
 
     Parameters
     ----------
@@ -87,11 +91,32 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     return dataset_of(opened)
 
 
+class _DoneChunks(WrapperStore[LocalStore]):
+    """The files of a store without the answers of chunks that are not done, which may be half."""
+
+    def __init__(self, store: LocalStore, answers: Collection[str]) -> None:
+        super().__init__(store)
+        self._answers = answers
+
+    def _with_store(self, store: LocalStore) -> _DoneChunks:
+        return _DoneChunks(store, self._answers)
+
+    async def get(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
+    ) -> Buffer | None:
+        array, _, place = key.partition("/")
+        of_chunk = array in self._answers and place.startswith("c/")
+        if of_chunk and not (self._store.root / "status" / place).exists():
+            return None
+        return await super().get(key, prototype, byte_range)
+
+
 def dataset_of(store: SweepStore) -> xarray.Dataset:
-    """The dataset of a store; its chunks are not compared with their checksums."""
+    """The dataset of the chunks that are done; they are not compared with their checksums."""
     import xarray
 
-    return xarray.open_zarr(store.path, consolidated=False, chunks=None)
+    files = _DoneChunks(LocalStore(store.path, read_only=True), store.arrays)
+    return xarray.open_zarr(files, consolidated=False, chunks=None)
 
 
 @typed

@@ -24,6 +24,7 @@ from asperity.study import (
     store_status,
     summary_statistics,
 )
+from asperity.study.points import Answers
 from asperity.study.store import root, store
 from asperity.study.store.layout import reset
 from asperity.study.store.lock import store_lock
@@ -288,6 +289,50 @@ def test_a_damaged_chunk_is_not_read(
     # Another part of the store is whole.
     curve = plot_slice(out, "mu1", x="epsilon", at={"K": 2.0}).axes[0].lines[0]
     assert np.array_equal(curve.get_ydata()[:10], 2 * curve.get_xdata()[:10])
+
+
+@pytest.mark.parametrize("fault", ["whole", "cut", "empty", "missing"])
+def test_an_interrupted_chunk_is_not_exported(
+    tmp_path: Path, closed_form: ClosedForm, fault: str
+) -> None:
+    """A kill may leave any part of its files, those of an earlier run among them."""
+    out, target = tmp_path / "s.zarr", tmp_path / "s.nc"
+    run(out)
+    file = out / "mu1" / "c" / "0" / "1"
+    content = file.read_bytes()
+    left = {"whole": content, "cut": content[: len(content) // 2], "empty": b""}
+    (out / "status" / "c" / "0" / "1").unlink()
+    file.unlink()
+    if fault in left:
+        file.write_bytes(left[fault])
+    assert export_store(out, target) == POINTS - 10
+    with xarray.open_dataset(target) as exported, open_store(out) as opened:
+        for dataset in (exported, opened):
+            assert (dataset["outcome"].values[0, 10:] == -1).all()
+            for name in ("mu1", "mu2", "detail"):
+                assert np.isnan(dataset[name].values[0, 10:]).all()
+                assert np.isfinite(dataset[name].values[0, :10]).all()
+            assert (dataset["outcome"].values[:, :10] >= 0).all()
+
+
+def test_any_reader_sees_a_half_written_chunk_as_not_computed(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    written = SweepStore(out)
+    with pytest.MonkeyPatch.context() as patch:
+
+        def killed(file: Path) -> None:
+            if file.match("mu2/c/0/1"):
+                raise Killed
+
+        patch.setattr(store, "make_way", killed)
+        with pytest.raises(Killed):
+            written.write(1, Answers.empty(("mu1", "mu2"), 10))
+    with xarray.open_zarr(out, chunks=None) as dataset:
+        assert np.isfinite(dataset["mu1"].values[0, 10:18]).all()
+        assert (dataset["outcome"].values[0, 10:] == -1).all()
 
 
 def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -> None:

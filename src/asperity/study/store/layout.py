@@ -165,11 +165,12 @@ def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
 
 
 def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
-    """Set a chunk of a store to "not done"."""
-    file = chunk_file(path, "status", grid.place(chunk))
-    if file.is_file():
-        file.unlink()
-        sync_folder(file.parent)
+    """Set a chunk of a store to "not done", and its points to "not computed"."""
+    for name in ("status", "outcome"):
+        file = chunk_file(path, name, grid.place(chunk))
+        if file.is_file():
+            file.unlink()
+            sync_folder(file.parent)
 
 
 def checksum(content: bytes = b"") -> Any:

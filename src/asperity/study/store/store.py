@@ -161,15 +161,12 @@ class SweepStore:
         reset(self.path, self.grid, chunk)
         slices = self.grid.slices(chunk)
         shape = tuple(s.stop - s.start for s in slices)
-        values: dict[str, Any] = {
-            **answers.numbers,
-            "outcome": answers.outcome,
-            "detail": answers.detail,
-        }
         for name in self._of_chunks:
             make_way(self._file(name, chunk))
-        for name, array in self.arrays.items():
-            array[slices] = values[name].reshape(shape)
+        # The outcome last: other readers then see a half-written chunk as "not computed".
+        numbers: dict[str, Any] = {**answers.numbers, "detail": answers.detail}
+        for name, values in [*numbers.items(), ("outcome", answers.outcome)]:
+            self.arrays[name][slices] = values.reshape(shape)
         self.checksum[self.grid.place(chunk)] = self._digest(chunk, answers.failed)
         self._sync([self._file(name, chunk) for name in (*self.arrays, "checksum")])
         self.status[self.grid.place(chunk)] = answers.failed
