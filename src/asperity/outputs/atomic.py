@@ -67,14 +67,18 @@ def replaced(target: Path, fresh: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def writable(target: Path, name: str = "out") -> Iterator[None]:
+def writable(
+    target: Path,
+    name: str = "out",
+    rule: str = "be a file that can be written",
+    advice: str = "choose a folder that exists, is writable and has room",
+) -> Iterator[None]:
     """Raise an `InputError` about `target` in place of an error of the file system."""
     try:
         yield
     except OSError as error:
         got = f"'{target}' ({(error.strerror or str(error)).lower()})"
-        advice = "choose a folder that exists, is writable and has room"
-        raise InputError(name, "be a file that can be written", got, advice) from None
+        raise InputError(name, rule, got, advice) from None
 
 
 def to_disk(path: Path) -> None:
@@ -92,10 +96,8 @@ def require_folder(folder: Path, name: str = "out") -> None:
     InputError
         About `name`.
     """
-    staging, lock = _staging(folder, name)
-    shutil.rmtree(staging, ignore_errors=True)
-    if lock is not None:
-        os.close(lock)
+    with written_folder(folder, name):
+        pass  # without files
 
 
 @typed
@@ -113,27 +115,25 @@ def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
     InputError
         About `name`, at once, if the folder cannot be written.
     """
-    staging, lock = _staging(folder, name)
-    try:
-        yield staging
-        _move_files(staging, folder, name)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
-
-
-def _staging(folder: Path, name: str) -> tuple[Path, int | None]:
-    """A new temporary folder, and the descriptor that holds its lock where there are locks."""
-    try:
+    rule, advice = "be a folder that can be written", "choose another folder"
+    with writable(folder, name, rule, advice):
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(20, "it is a file")
         place = folder
         while not place.exists():
             place = place.parent
-        return held_folder(place, _PREFIX)
-    except OSError as error:
-        raise _unwritable(folder, name, error) from None
+        staging, lock = held_folder(place, _PREFIX)
+    try:
+        yield staging
+        with writable(folder, name, rule, advice):
+            for source in sorted(p for p in staging.rglob("*") if p.is_file()):
+                target = folder / source.relative_to(staging)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                source.replace(target)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
 
 
 def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
@@ -189,22 +189,6 @@ def _locked(folder: Path, *, wait: bool = False) -> int | None:
         os.close(descriptor)
         return None
     return descriptor
-
-
-def _move_files(staging: Path, folder: Path, name: str) -> None:
-    try:
-        for source in sorted(p for p in staging.rglob("*") if p.is_file()):
-            target = folder / source.relative_to(staging)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source, target)
-    except OSError as error:
-        raise _unwritable(folder, name, error) from None
-
-
-def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
-    why = (error.strerror or "no reason given").lower()
-    rule, advice = "be a folder that can be written", "choose another folder"
-    return InputError(name, rule, f"'{folder}' ({why})", advice)
 
 
 @typed

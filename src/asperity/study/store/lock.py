@@ -14,12 +14,13 @@ import socket
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from asperity.errors import InputError
+from asperity.outputs.atomic import writable
 from asperity.outputs.json import json_content
 
 try:
@@ -64,7 +65,7 @@ def store_lock(store: Path) -> Iterator[StoreLock]:
         If another driver has it, or the file cannot be written.
     """
     path, token = lock_file(store), uuid.uuid4().hex
-    with _sentence(path):
+    with _writable(path):
         descriptor = _locked(path)
     record = {
         "token": token,
@@ -73,7 +74,7 @@ def store_lock(store: Path) -> Iterator[StoreLock]:
         "since": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }
     try:
-        with _sentence(path):
+        with _writable(path):
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, json.dumps(record).encode(), 0)
         yield StoreLock(token, descriptor)
@@ -84,15 +85,8 @@ def store_lock(store: Path) -> Iterator[StoreLock]:
         os.close(descriptor)
 
 
-@contextmanager
-def _sentence(path: Path) -> Iterator[None]:
-    """Raise an `InputError` in place of an error of the file system."""
-    try:
-        yield
-    except OSError as error:
-        rule = "lie in a folder that can be written"
-        got = f"'{path}' ({(error.strerror or str(error)).lower()})"
-        raise InputError("out", rule, got, "choose another folder") from None
+def _writable(path: Path) -> AbstractContextManager[None]:
+    return writable(path, "out", "lie in a folder that can be written", "choose another folder")
 
 
 def _locked(path: Path) -> int:
