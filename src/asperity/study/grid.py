@@ -128,31 +128,22 @@ class SweepGrid:
 
     def between(self, slices: Slices) -> Points:
         """The points of a part of the grid in C order."""
-        rows = [axis.rows(s.start, s.stop) for axis, s in zip(self.axes, slices, strict=True)]
-        return self._points(rows, tuple(s.stop - s.start for s in slices))
-
-    def _points(self, rows: list[dict[str, Column]], shape: tuple[int, ...]) -> Points:
-        """The product of the columns of all axes."""
+        shape = tuple(s.stop - s.start for s in slices)
         count = math.prod(shape)
-        values = {n: np.full(count, float(v)) for n, v in self.record["numbers"].items()}
-        laws = np.full(count, self.record["laws"][0], dtype=object)
-        data = None
-        for i, columns in enumerate(rows):
-            for name, column in columns.items():
+        columns: dict[str, Column] = {
+            n: np.full(count, float(v)) for n, v in self.record["numbers"].items()
+        }
+        columns["law"] = np.full(count, self.record["laws"][0], dtype=object)
+        for i, (axis, part) in enumerate(zip(self.axes, slices, strict=True)):
+            for name, column in axis.rows(part.start, part.stop).items():
                 along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
-                column = np.broadcast_to(along, shape).ravel()
-                if name == "law":
-                    laws = np.array(column, dtype=object)
-                elif name == "data":
-                    data = np.array(column, dtype=object)
-                else:
-                    values[name] = np.array(column, dtype=float)
+                columns[name] = np.array(np.broadcast_to(along, shape)).ravel()
         for name, ratio in RATIOS.items():
-            if name in values:
-                needed = {n: values.get(n, np.full(count, np.nan)) for n in (name, *ratio.needs)}
+            if name in columns:
+                needed = {n: columns.get(n, np.full(count, np.nan)) for n in (name, *ratio.needs)}
                 with np.errstate(all="ignore"):
-                    values[ratio.target] = ratio.solve(needed)
-        return Points(laws, values, data)
+                    columns[ratio.target] = ratio.solve(needed)
+        return Points(columns.pop("law"), data=columns.pop("data", None), values=columns)
 
     def _chunks(self) -> tuple[int, ...]:
         """Chunk lengths: laws apart, then as many points of the last axes as belong together."""

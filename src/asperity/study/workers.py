@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
 from asperity._processes import ENVIRONMENT, kept_processes
@@ -117,11 +117,9 @@ class DaskWorkers(Workers):
         self._executor.shutdown(wait=False)
 
 
-@contextmanager
-def local_processes(count: int) -> Iterator[Workers]:
+def local_processes(count: int) -> AbstractContextManager[Workers]:
     """Processes of this machine, which are killed if the block ends with an exception."""
-    with _closing(LocalProcesses(count)) as workers:
-        yield workers
+    return _closing(LocalProcesses(count))
 
 
 @contextmanager

@@ -114,7 +114,7 @@ def _holds(file: Path, content: bytes) -> bool:
         return False
 
 
-def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
     """Append points to a store; chunks that get new points become "not done".
 
     After an interruption the shorter plan and the longer one can both be continued: the root, which
@@ -129,15 +129,10 @@ def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any
         Grid of a plan for which `is_extension` holds.
     attributes : mapping
         Attributes of the longer store that do not follow from its grid.
-
-    Returns
-    -------
-    list of str
-        As for `lay_out`.
     """
     for chunk in _touched(root.grid, grid):
         reset(path, root.grid, chunk)
-    return lay_out(path, grid, {"runs": root.runs, **attributes})
+    lay_out(path, grid, {"runs": root.runs, **attributes})
 
 
 def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
