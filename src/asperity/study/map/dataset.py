@@ -65,25 +65,23 @@ def boundary_lines(dataset: xarray.Dataset) -> list[dict[str, Any]]:
 
 
 def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
-    where, points = boundary.where, boundary.points
-    values = plane.values(where)
-    kinds = np.where(boundary.line >= 0, bifurcation_kinds(points), "")
-    named: dict[str, Any] = {
-        "boundary_line": (
-            _POINT,
-            boundary.line,
-            _described("1", "line of the point; -1: not located"),
-        ),
-        "boundary_kind": _texts((_POINT,), kinds, "bifurcation on the stability boundary"),
-        "boundary_result": _texts((_POINT,), boundary.reason, "converged, or why not located"),
+    points, values = boundary.points, plane.values(boundary.where)
+    kinds = np.where(boundary.line >= 0, bifurcation_kinds(points), "").astype(str)
+    named: dict[str, tuple[Any, str, str]] = {
+        "line": (boundary.line, "1", "line of the point; -1: not located"),
+        "kind": (kinds, "1", "bifurcation on the stability boundary"),
+        "result": (boundary.reason.astype(str), "1", "converged, or why not located"),
     }
     for axis in (plane.x, plane.y):
-        attributes = _described(axis.unit or "1", f"{axis.name} on the stability boundary")
-        named[f"boundary_{axis.name}"] = (_POINT, values[axis.name], attributes)
+        meaning = f"{axis.name} on the stability boundary"
+        named[axis.name] = values[axis.name], axis.unit or "1", meaning
     for name in ("mode_frequency", "log_multiplier"):
-        attributes = _described(OUTPUTS[name].unit, f"{OUTPUTS[name].meaning}, on the boundary")
-        named[f"boundary_{name}"] = (_POINT, points[name], attributes)
-    return named
+        output = OUTPUTS[name]
+        named[name] = points[name], output.unit, f"{output.meaning}, on the boundary"
+    return {
+        f"boundary_{name}": (_POINT, column, _described(unit, meaning))
+        for name, (column, unit, meaning) in named.items()
+    }
 
 
 def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
@@ -145,7 +143,3 @@ def _global_attributes(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]
 
 def _described(unit: str, name: str) -> dict[str, str]:
     return {"units": unit, "long_name": name}
-
-
-def _texts(dims: tuple[str, ...], values: np.ndarray, name: str) -> tuple:
-    return dims, values.astype(str), _described("1", name)

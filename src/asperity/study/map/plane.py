@@ -65,30 +65,19 @@ class Axis:
     def __post_init__(self) -> None:
         parameter = _parameter(self.name)
         object.__setattr__(self, "name", parameter.name)
+        label = f"axis of {symbol(self.name)}"
         for end in ("low", "high"):
-            value = getattr(self, end)
-            label = f"axis of {symbol(self.name)}"
             # An angle is also a text in degrees.
-            si = number(parameter.check(value, label), label, parameter.kind, parameter.rule)
-            object.__setattr__(self, end, si)
-        if not self._ends[0] < self._ends[1]:
-            rule = "go from a smaller to a larger value"
-            got = f"{self.low:g} to {self.high:g}{_unit(parameter)}"
-            raise InputError(
-                f"axis of {symbol(self.name)}", rule, got, "write the smaller end first"
-            )
-        rule, got = f"have 2 to {_MOST:,} points", shown(self.count)
-        require(
-            2 <= self.count <= _MOST,
-            f"axis of {symbol(self.name)}",
-            rule,
-            got,
-            "write another number",
-        )
-        if self.log and not self._ends[0] > 0:
-            rule, got = "start above zero to be logarithmic", f"{self.low:g}{_unit(parameter)}"
-            advice = "raise its lower end or make it linear"
-            raise InputError(f"axis of {symbol(self.name)}", rule, got, advice)
+            value = parameter.check(getattr(self, end), label)
+            object.__setattr__(self, end, number(value, label, parameter.kind, parameter.rule))
+        low, high = self._ends
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        rule, got = "go from a smaller to a larger value", f"{low:g} to {high:g}{unit}"
+        require(low < high, label, rule, got, "write the smaller end first")
+        rule, advice = f"have 2 to {_MOST:,} points", "write another number"
+        require(2 <= self.count <= _MOST, label, rule, shown(self.count), advice)
+        rule, advice = "start above zero to be logarithmic", "raise its lower end or make it linear"
+        require(not self.log or low > 0, label, rule, f"{low:g}{unit}", advice)
 
     @classmethod
     @typed
@@ -107,13 +96,8 @@ class Axis:
         name, low, high, count, unit = (part.strip() for part in match.groups())
         parameter = _parameter(name)
         advice = f"write it like '{symbol(name)}={low}:{high}:{count} {parameter.unit}'"
-        require(
-            not parameter.unit or unit,
-            f"axis of {symbol(name)}",
-            "carry a unit",
-            f"'{text}'",
-            advice,
-        )
+        field = f"axis of {symbol(name)}"
+        require(not parameter.unit or unit, field, "carry a unit", f"'{text}'", advice)
         return cls(name, f"{low} {unit}".strip(), f"{high} {unit}".strip(), int(count), log)
 
     @property
@@ -150,10 +134,6 @@ def _parameter(name: str) -> Parameter:
         rule = "be a number of an operating point"
         raise InputError("axis", rule, shown(symbol(name)), suggestion(str(name), known))
     return known[name_in_table]
-
-
-def _unit(parameter: Parameter) -> str:
-    return f" {parameter.unit}" if parameter.unit else ""
 
 
 @dataclass(frozen=True)
