@@ -262,11 +262,16 @@ def plot(
     out: Path,
 ) -> int:
     """Draw an output over one or two axes."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
     from asperity.cli.options import settings_of
     from asperity.figures.slice import plot_slice
     from asperity.outputs import output_file
 
     where = settings_of(at, "--at")
     target = output_file(out, "--out", example="slice.png")
+    pictures = FigureCanvasBase.get_supported_filetypes()
+    known = target.suffix.lower().removeprefix(".") in pictures
+    require(known, "--out", "be a picture", f"'{out}'", "write it like slice.png")
     save_figure(lambda: plot_slice(store, show, x=x, y=y, at=where), target, option="--out")
     return 0

@@ -64,7 +64,7 @@ def plot_slice(
     for i, dim in enumerate(dims):
         if dim in chosen and numbered[dim]:
             position = _in_si(chosen[dim], part[dim].attrs.get("units", "1"), dim)
-            rows[i] = int(np.argmin(np.abs(part[dim].values - position)))
+            rows[i] = int(np.nanargmin(np.abs(part[dim].values - position)))
         elif dim not in (x, y):
             row, count = _in_si(chosen.get(dim, 0), "1", dim), part.sizes[dim]
             whole, advice = row in range(count), "give the number of a row"

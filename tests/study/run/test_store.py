@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from click.testing import CliRunner
 
+from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.figures.slice import plot_slice
 from asperity.study import (
@@ -616,3 +618,28 @@ def test_a_plane_and_a_curve(tmp_path: Path, closed_form: ClosedForm) -> None:
         plot_slice(tmp_path / "s.zarr", "mu1", x="epsilom")
     with pytest.raises(InputError, match="show must be an output"):
         plot_slice(tmp_path / "s.zarr", "mu9", x="epsilon")
+
+
+@pytest.mark.parametrize("name", ["slice", "slice.xyz"])
+def test_a_picture_of_no_known_format_is_refused(
+    tmp_path: Path, closed_form: ClosedForm, name: str
+) -> None:
+    run(tmp_path / "s.zarr")
+    call = ["sweep", "plot", str(tmp_path / "s.zarr"), "--show", "mu1", "--x", "epsilon", "--out"]
+    assert CliRunner().invoke(main, [*call, str(tmp_path / "slice.png")]).exit_code == 0
+    refused = CliRunner().invoke(main, [*call, str(tmp_path / name)])
+    assert refused.exit_code == 2
+    assert "--out must be a picture" in refused.stderr
+
+
+def test_a_row_without_a_number_is_not_the_nearest_one(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    axes = {
+        "eta": {"values": ("", 1.0, 2.0)},
+        "epsilon": {"values": (0.1, 0.2, 0.3)},
+        "K": {"values": (1.0,)},
+    }
+    run(tmp_path / "s.zarr", plan=plan_of().model_copy(update={"axes": axes}))
+    curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"eta": 1.9})
+    assert "2.0" in curve.axes[0].get_title()
