@@ -118,6 +118,33 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
     assert peak[1] > peak[0]  # the lighter slider is held by the stiffer spring, K/Kc
 
 
+def test_a_transient_follows_a_recording_next_to_its_plan(tmp_path: Path) -> None:
+    """The working folder has none of that name; another recording is another plan."""
+
+    def record(load: float) -> None:
+        rows = "".join(f"{t / 10},7,1\n" for t in range(10)) + f"1,{load},1\n"
+        (tmp_path / "load.csv").write_text("time (s),load (N),velocity (um/s)\n" + rows)
+
+    plan = {
+        "solve": "transient",
+        "law": "rice-ruina",
+        "parameters": {"V": 1e-6, "K": 2 * KC},
+        "axes": {"W0": {"values": ("7 N",)}},
+        "transient": {
+            "steps": ("follow load and velocity from load.csv",),
+            "sampling": "10 Hz",
+            "numbers": {"last": {"of": "load", "take": "last"}},
+        },
+        "folder": tmp_path,
+    }
+    record(7.5)
+    dataset = sweep(tmp_path / "s.zarr", **plan)
+    assert dataset["last"].values == pytest.approx([7.5])
+    record(8.0)
+    with pytest.raises(InputError, match=r"have the same plan, got settings\.followed = "):
+        sweep(tmp_path / "s.zarr", **plan)
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

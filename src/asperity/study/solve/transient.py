@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
-from asperity.loads import Programme
+from asperity.loads import Follow, Programme
 from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
@@ -60,9 +61,10 @@ class TransientSolve(SolveKind):
             rule = "be left out where solve is 'transient'"
             raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
         numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
-        _check_steps(plan, table)
+        followed = _followed(_checked_steps(plan, table))
         return {
             "steps": list(table.steps),
+            **({"followed": followed} if followed else {}),
             "sampling": number(table.sampling, "transient.sampling", "frequency", "positive"),
             "rtol": table.rtol,
             "most_steps": table.most_steps,
@@ -86,7 +88,10 @@ class TransientSolve(SolveKind):
         for k in solvable(law, values, answers):
             point = {n: float(v[k]) for n, v in values.items()}
             named = {n: float(v[k]) for n, v in points.values.items()} | point
-            steps = _planned(settings["steps"], named, Path())
+            steps = _planned(settings["steps"], named, Path(record["folder"]))
+            same = _followed(steps) == settings.get("followed", [])
+            rule, advice = "not change while a sweep runs", "restore it, or choose another store"
+            require(same, "a recording that is followed", rule, "other samples", advice)
             trajectory = transient(
                 slider_from(law, point),
                 Programme(*steps, load=point["W0"], velocity=point["V"]),
@@ -126,6 +131,13 @@ def _planned(lines: Iterable[str], values: Mapping[str, float], folder: Path) ->
     return [planned.step for planned in steps]
 
 
+def _followed(steps: Iterable[Any]) -> list[str]:
+    """SHA-256 of the samples of each recording that the steps follow."""
+    followed = [(s.time, s.load, s.velocity) for s in steps if isinstance(s, Follow)]
+    samples = [[np.asarray(column, float).tobytes() for column in f] for f in followed]
+    return [hashlib.sha256(b"|".join(columns)).hexdigest() for columns in samples]
+
+
 def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     """A checked entry of ``transient.numbers`` as JSON values."""
     place = f"transient.numbers.{name}"
@@ -140,12 +152,12 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     return {"of": entry.of, "take": entry.take, **times}
 
 
-def _check_steps(plan: Sweep, table: TransientTable) -> None:
-    """Check the names in braces, and the lines with a number in place of each brace."""
+def _checked_steps(plan: Sweep, table: TransientTable) -> list[Any]:
+    """The steps with a number in place of each name in braces, after a check of the names."""
     known = {**all_parameters([get_law(plan.law)] if plan.law else []), **EXPERIMENT}
     for line in table.steps:
         for _, name, *_ in string.Formatter().parse(line):
             if name is not None and name not in known:
                 rule = "name parameters in braces"
                 raise InputError("transient.steps", rule, f"'{{{name}}}'", closest(name, known))
-    _planned(table.steps, dict.fromkeys(known, 0.5), plan.folder)
+    return _planned(table.steps, dict.fromkeys(known, 0.5), plan.folder)
