@@ -162,6 +162,8 @@ def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_t
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\n[axes.data]\nvalues = ['a.csv']", "got both"),
         ("[fit]\nfree = ['M']\ndata = 'a.csv'", "got 'M', which has no influence without inertia"),
         ("[fit]\nfree = ['M']\ndata = 'a.csv'\n[axes.inertia]\nvalues = [true, false]", "got 'M'"),
+        ("[fit]\nfree = ['B']\ndata = 'a.csv'\n[axes.pull]\nvalues = [0.1, 0.2]",
+         "pull must be a parameter of a harmonic load"),
         ("[transient]\nsteps = []\nsampling = 1\nnumbers = {}", "transient must be left out"),
     ],
 )  # fmt: skip

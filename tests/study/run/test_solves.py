@@ -146,6 +146,32 @@ def test_a_transient_follows_a_recording_next_to_its_plan(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ({"parameters": {"V": 1e-6, "epsilon": 0.2}}, "parameters.epsilon"),
+        ({"axes": {"pull": {"values": (0.1, 0.2)}}}, "axes.pull"),
+    ],
+)
+def test_a_modulation_that_no_step_uses_is_refused(
+    tmp_path: Path, fields: dict[str, Any], place: str
+) -> None:
+    """The load is what the steps say: the numbers would be those of a constant load."""
+    plan = {
+        "solve": "transient",
+        "law": "rice-ruina",
+        "parameters": {"V": 1e-6},
+        "axes": {"K": {"values": (2 * KC,)}},
+        "transient": {
+            "steps": ("slide for 1 s",),
+            "sampling": "10 Hz",
+            "numbers": {"last": {"of": "friction", "take": "last"}},
+        },
+    }
+    with pytest.raises(InputError, match=rf"{place} must stand in a step"):
+        sweep(tmp_path / "s.zarr", **{**plan, **fields})
+
+
+@pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"axes": {"epsilom": {"values": (0.1,)}}}, "did you mean 'epsilon'"),

@@ -85,6 +85,9 @@ class FitSolve(SolveKind):
         """As in `SolveKind`."""
         table = _table(plan)
         free = _free(table)
+        for name in (*plan.parameters, *plan.columns):
+            rule, advice = "be a parameter of a harmonic load", "leave it out: fits take no other"
+            require(not canonical_name(name, MODULATION), name, rule, advice=advice)
         inertia = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
         holds = "M" not in free or all(value in (True, "true", "yes", 1) for value in inertia)
         rule, got = "be parameters of the model", "'M', which has no influence without inertia"
@@ -274,7 +277,7 @@ def _fixed(
         name: value
         for name, value in values.items()
         if name in names
-        and name not in (*MODULATION, "inertia", "noise_seed")
+        and name not in ("inertia", "noise_seed")
         and (origins.get(name, "plan") == "plan" or name not in columns)
     }
 

@@ -13,7 +13,14 @@ import numpy as np
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.loads import Follow, Programme
-from asperity.parameters import EXPERIMENT, Output, all_parameters
+from asperity.parameters import (
+    DRIVE,
+    EXPERIMENT,
+    MODULATION,
+    Output,
+    all_parameters,
+    canonical_name,
+)
 from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
 from asperity.questions.sweep import NumberTable, Sweep, TransientTable
@@ -61,6 +68,7 @@ class TransientSolve(SolveKind):
             rule = "be left out where solve is 'transient'"
             raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
         numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
+        _require_drive_in_steps(plan, table)
         followed = _followed(_checked_steps(plan, table))
         return {
             "steps": list(table.steps),
@@ -150,6 +158,18 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
         for side, value in (("from", entry.from_), ("to", entry.to))
     }
     return {"of": entry.of, "take": entry.take, **times}
+
+
+def _require_drive_in_steps(plan: Sweep, table: TransientTable) -> None:
+    """Refuse a modulation that no step uses: only steps move the load and the pull."""
+    used = {name for line in table.steps for _, name, *_ in string.Formatter().parse(line)}
+    given = {n: f"parameters.{n}" for n, value in plan.parameters.items() if value}
+    alone = [n for n, axis in plan.axes.items() if axis.zip is axis.cases is axis.over is None]
+    given |= {n: f"axes.{n}" for n in alone}
+    for written, place in given.items():
+        name = canonical_name(written, {"epsilon": DRIVE["epsilon"], **MODULATION})
+        rule, advice = "stand in a step", "write it into one, in braces, or leave it out"
+        require(name is None or name in used, place, rule, f"no '{{{name}}}'", advice)
 
 
 def _checked_steps(plan: Sweep, table: TransientTable) -> list[Any]:
