@@ -72,8 +72,12 @@ def plot_slice(
             rows[i] = int(row)
     values = opened.part(show, rows)
     part = part.isel({dims[i]: row for i, row in rows.items()}).copy(data=values)
-    for side in (x, y):
-        if side is not None and not numbered[side]:
+    for side in filter(None, (x, y)):
+        if numbered[side]:
+            # In rising order, without the rows that have no number, which are sorted to the end.
+            order = np.argsort(part[side].values, kind="stable")
+            part = part.isel({side: order[: int(part[side].notnull().sum())]})
+        else:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})
             part[side].attrs |= {"long_name": f"row of {side}", "units": "1"}
     # Titles name the position on the other axes; a pure number needs no unit.

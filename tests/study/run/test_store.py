@@ -632,14 +632,16 @@ def test_a_picture_of_no_known_format_is_refused(
     assert "--out must be a picture" in refused.stderr
 
 
-def test_a_row_without_a_number_is_not_the_nearest_one(
-    tmp_path: Path, closed_form: ClosedForm
-) -> None:
+def test_rows_in_any_order_and_without_a_number(tmp_path: Path, closed_form: ClosedForm) -> None:
     axes = {
         "eta": {"values": ("", 1.0, 2.0)},
-        "epsilon": {"values": (0.1, 0.2, 0.3)},
+        "epsilon": {"values": (0.3, 0.1, 0.2)},
         "K": {"values": (1.0,)},
     }
     run(tmp_path / "s.zarr", plan=plan_of().model_copy(update={"axes": axes}))
-    curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"eta": 1.9})
-    assert "2.0" in curve.axes[0].get_title()
+    curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"eta": 1.9}).axes[0]
+    # The row without a number is not the nearest one.
+    assert "2.0" in curve.get_title()
+    assert curve.lines[0].get_ydata().tolist() == [0.1, 0.2, 0.3]
+    (mesh,) = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", y="eta").axes[0].collections
+    assert mesh.get_array().reshape(2, 3).tolist() == [[0.1, 0.2, 0.3]] * 2
