@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from asperity.study.workers import Workers
 
@@ -48,14 +47,6 @@ class DoneChunk:
     seconds: float | None
     messages: tuple[str, ...] = ()
     memory: float = 0.0
-
-
-class Task(Protocol):
-    """A callable that solves and writes a chunk; pickled where the workers are other processes."""
-
-    def __call__(self, chunk: int, give_up: bool = False, /) -> DoneChunk:
-        """Solve and write a chunk; with `give_up` mark its points as failed without solving."""
-        ...
 
 
 @dataclass
@@ -135,7 +126,7 @@ class SweepProgress:
 
 
 def solve_chunks(
-    task: Task,
+    task: Callable[[int, bool], DoneChunk],
     chunks: Iterable[int],
     workers: Workers,
     progress: SweepProgress,
@@ -146,7 +137,9 @@ def solve_chunks(
 
     Parameters
     ----------
-    task : Task
+    task : callable
+        Solves and writes the chunk of a number; with True as second argument it marks the points as
+        failed without solving. Pickled where the workers are other processes.
     chunks : iterable of int
         Numbers of the chunks, in the order in which they are submitted.
     workers : Workers

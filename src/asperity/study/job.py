@@ -47,7 +47,7 @@ class WorkerError(InputError):
 
 @dataclass(frozen=True)
 class Job:
-    """The `Task` of a sweep: called with the number of a chunk, it solves and writes the chunk.
+    """The task of a sweep: called with the number of a chunk, it solves and writes the chunk.
 
     Attributes
     ----------

@@ -164,8 +164,12 @@ def _require_drive_in_steps(plan: Sweep, table: TransientTable) -> None:
     """Refuse a modulation that no step uses: only steps move the load and the pull."""
     used = {name for line in table.steps for _, name, *_ in string.Formatter().parse(line)}
     given = {n: f"parameters.{n}" for n, value in plan.parameters.items() if value}
-    alone = [n for n, axis in plan.axes.items() if axis.zip is axis.cases is axis.over is None]
-    given |= {n: f"axes.{n}" for n in alone}
+    # A column that varies together with others may be a label.
+    given |= {
+        name: f"axes.{name}"
+        for name, axis in plan.axes.items()
+        if axis.values is not None or axis.from_ is not None
+    }
     for written, place in given.items():
         name = canonical_name(written, {"epsilon": DRIVE["epsilon"], **MODULATION})
         rule, advice = "stand in a step", "write it into one, in braces, or leave it out"
