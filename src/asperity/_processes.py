@@ -43,13 +43,8 @@ def process_count(value: int, name: str) -> int:
     InputError
     """
     most = max(64, 4 * available_cores())
-    require(
-        1 <= value <= most,
-        name,
-        f"be from 1 to {most} processes",
-        value,
-        "give another number",
-    )
+    rule = f"be from 1 to {most} processes"
+    require(1 <= value <= most, name, rule, value, "give another number")
     return value
 
 

@@ -149,14 +149,8 @@ def _draw_recording(axis: Axes, measurement: Measurement) -> None:
 def _draw_cycle(axis: Axes, measurement: Measurement) -> None:
     """The mean cycle of the force against the phase of the load."""
     cycle, scale = mean_cycle(measurement), 1e3
-    axis.plot(
-        cycle.phase,
-        scale * cycle.measured,
-        "o",
-        markersize=2.6,
-        color=_MEASURED,
-        label="measured, mean cycle",
-    )
+    look: dict[str, Any] = {"markersize": 2.6, "color": _MEASURED, "label": "measured, mean cycle"}
+    axis.plot(cycle.phase, scale * cycle.measured, "o", **look)
     harmonics = measurement.reading.harmonics.size
     axis.plot(cycle.fine_phase, scale * cycle.fitted, color=_FITTED, label=f"{harmonics} harmonics")
     room_above(axis, 0.35)

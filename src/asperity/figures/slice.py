@@ -44,7 +44,8 @@ def plot_slice(
     Raises
     ------
     InputError
-        If the store has no such output or axis, or a chunk of the slice is damaged.
+        If the store has no such output or axis, an axis of the picture has one row only, or a chunk
+        of the slice is damaged.
     """
     opened = SweepStore(file_path(store, "store"), mode="r")
     require_known(show, list(opened.arrays), "show", "be an output")
@@ -80,6 +81,8 @@ def plot_slice(
         else:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})
             part[side].attrs |= {"long_name": f"row of {side}", "units": "1"}
+        rule, advice = "be an axis of several rows", "draw over another axis"
+        require(part.sizes[side] > 1, "x" if side == x else "y", rule, f"'{side}' of one", advice)
     # Titles name the position on the other axes; a pure number needs no unit.
     part = part.drop_vars([n for n, c in part.coords.items() if c.ndim == 0 and n not in dims])
     units = {side: axis_unit(part[side]) for side in (x, y) if side is not None}

@@ -645,3 +645,6 @@ def test_rows_in_any_order_and_without_a_number(tmp_path: Path, closed_form: Clo
     assert curve.lines[0].get_ydata().tolist() == [0.1, 0.2, 0.3]
     (mesh,) = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", y="eta").axes[0].collections
     assert mesh.get_array().reshape(2, 3).tolist() == [[0.1, 0.2, 0.3]] * 2
+    # A plane without height would be an empty picture.
+    with pytest.raises(InputError, match="y must be an axis of several rows, got 'K' of one"):
+        plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", y="K")

@@ -60,12 +60,8 @@ class SolveKind(ABC):
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
         """Refuse chunks whose points do not fit in memory while they are solved."""
-        require_memory(
-            points * POINT_BYTES,
-            "chunk",
-            f"{points:,} points at a time",
-            "lower it or leave it out",
-        )
+        what, advice = f"{points:,} points at a time", "lower it or leave it out"
+        require_memory(points * POINT_BYTES, "chunk", what, advice)
 
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """Approximate number of points of a chunk."""
