@@ -103,13 +103,10 @@ DASHES = {"slow": "solid", "fast": "dashed"}
 @contextmanager
 def style() -> Iterator[None]:
     """The project's style for drawing and saving; the user's style is restored."""
-    import matplotlib as mpl
+    from matplotlib.style import context
 
-    with as_file(files("asperity.figures") / "asperity.mplstyle") as path:
-        settings = mpl.rc_params_from_file(path, use_default_template=True)
-    # The default parameters include the backend, which must not change here.
-    chosen = {name: value for name, value in settings.items() if not name.startswith("backend")}
-    with mpl.rc_context(chosen):
+    path = files("asperity.figures") / "asperity.mplstyle"
+    with as_file(path) as file, context(file, after_reset=True):
         yield
 
 
