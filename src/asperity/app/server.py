@@ -141,8 +141,7 @@ def server_on(
         server_header=False,
         date_header=False,
         http=Connection,
-        # uvloop, which uvicorn takes where it is installed, starts workers by a plain fork; JAX warns
-        # of that.
+        # uvloop, which uvicorn takes where it is installed, forks to start workers; JAX warns of it.
         loop="asyncio",
         ws="none",
         lifespan="on",
