@@ -141,7 +141,7 @@ def server_on(
         server_header=False,
         date_header=False,
         http=Connection,
-        # uvloop, which uvicorn takes where it is installed, forks to start workers; JAX warns of it.
+        # uvloop, taken where it is installed, starts workers by a fork, and JAX warns of that.
         loop="asyncio",
         ws="none",
         lifespan="on",
