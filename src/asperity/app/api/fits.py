@@ -185,8 +185,11 @@ def _fit(
     posterior = None
     if best is not None and best.converged:
         if question.posterior:
-            on_draws = lambda done, total: report(draws=done, of=total)  # noqa: E731
-            posterior = sample_posterior(best, **question.sampling, progress=on_draws)
+            posterior = sample_posterior(
+                best,
+                **question.sampling,
+                progress=lambda done, total: report(draws=done, of=total),
+            )
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
             record["sections"] += records(posterior_sections(posterior))
         report(stage="figures")
