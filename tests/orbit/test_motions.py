@@ -406,6 +406,16 @@ def test_a_law_without_rate_balances_the_shear_force():
     assert response.mu1 == pytest.approx(0.2 * (0.5 - np.tan(TILT)), rel=1e-12)
 
 
+def test_a_law_without_rate_has_the_harmonics_of_a_load_with_many():
+    """A load that is nearly a square: its harmonics beyond those asked for do not fold back."""
+    theta = 2 * np.pi * np.arange(256) / 256
+    square = sampled(1 + 0.3 * np.sign(np.cos(theta + 0.01)))
+    null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0)
+    response = asp.periodic_response(null, velocity=1e-6, frequency=120.0, modulation=square)
+    of_load = [0.5 * (a - 1j * b) for a, b in square.load[:8]]
+    assert response.harmonics == pytest.approx(np.array(of_load), abs=1e-14)
+
+
 def test_provenance_writes_the_modulation_out():
     programme = modulated(0.2, load={2: (0.1, 0.0)}, pull=0.5)
     null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0)

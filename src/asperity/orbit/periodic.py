@@ -16,7 +16,7 @@ from jax.typing import ArrayLike
 from asperity._processes import available_cores, process_count
 from asperity.errors import require
 from asperity.laws import Law
-from asperity.loads import Harmonic, Modulation
+from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.response import PeriodicResponse
 from asperity.orbit.search import (
@@ -147,7 +147,7 @@ def _mu_ss(law: Law, V: ArrayLike) -> Array:
 def _proportional(problem: Problem, points: int, options: SearchOptions) -> Solution:
     """A law without rate dependence: the force follows load and shear force, without dynamics."""
     (system, load), (harmonics, phases, *_) = problem, options
-    count = max(phases, 4 * harmonics)
+    count = max(phases, 4 * harmonics + 2 * _harmonics_of(load))
 
     def force(samples: int) -> np.ndarray:
         theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
@@ -162,6 +162,19 @@ def _proportional(problem: Problem, points: int, options: SearchOptions) -> Solu
     solution.waveform[:] = np.stack([force(phases), np.zeros((phases, points))])
     solution.outcome[:] = Outcome.CONVERGED
     return solution
+
+
+#: Harmonics that a user's own load is taken to have.
+_MOST_HARMONICS = 1024
+
+
+def _harmonics_of(load: Modulation) -> int:
+    """Number of harmonics of the load and the shear force."""
+    if isinstance(load, Harmonic):
+        return 1
+    if isinstance(load, Periodic):
+        return max(len(load.load), len(load.shear))
+    return _MOST_HARMONICS
 
 
 #: Rate per radian of a perturbation that stands in for zero: the response differs from the limit by
