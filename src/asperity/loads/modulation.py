@@ -278,6 +278,9 @@ def sampled(
     Between the samples the signal is their trigonometric interpolation, as exact as the samples
     are for a signal with harmonics below half their number only.
 
+    The phases of a response count from the first sample: for phases against the load begin where
+    the first harmonic of the load is largest.
+
     Parameters
     ----------
     load : array, shape (samples,), optional

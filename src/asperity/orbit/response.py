@@ -43,7 +43,8 @@ class PeriodicResponse(Drawn):
     """Periodic response at one or many operating points.
 
     Convention: w(t) = 1 + eps cos(wt) and F/W0 = mean_friction + sum mu_n cos(n wt + phase_n), with
-    peak amplitudes mu_n = |c_n| and phases arg c_n in (-pi, pi].
+    peak amplitudes mu_n = |c_n| and phases arg c_n in (-pi, pi]. Under another `load` t = 0 is its
+    phase theta = 0: phases are against the load where its first harmonic is largest there.
 
     Attributes
     ----------
@@ -75,7 +76,8 @@ class PeriodicResponse(Drawn):
     start : array, shape (..., states)
         States of `motion` at the phase theta = 0.
     waveform : array, shape (2, ..., samples)
-        F/W0 and ln(v_plastic / V) at the phases `theta`.
+        F/W0 and ln(v_plastic / V) at the phases `theta`; the latter is 0 for a law without rate
+        dependence, which does not determine it.
     theta : array, shape (samples,)
     motion : Motion
         Equation of motion, with the slider.
@@ -161,12 +163,12 @@ class PeriodicResponse(Drawn):
 
     @property
     def phase1(self) -> Float:
-        """Phase of the first harmonic against the load (rad)."""
+        """Phase of the first harmonic against cos wt (rad)."""
         return np.angle(self.harmonics[..., 0])
 
     @property
     def phase2(self) -> Float:
-        """Phase of the second harmonic against the load's phase (rad)."""
+        """Phase of the second harmonic against cos 2wt (rad)."""
         return np.angle(self.harmonics[..., 1])
 
     @property

@@ -26,7 +26,7 @@ class Period(NamedTuple):
     Attributes
     ----------
     phase : array
-        Time over the period, 0 at the largest load.
+        Time over the period, 0 at theta = 0: under a harmonic load where that is largest.
     load : array
         W/W0.
     force : array
@@ -34,10 +34,12 @@ class Period(NamedTuple):
     velocity : array
         Velocity of the slider over the pulling velocity.
     plastic_velocity : array
-        Velocity of slip over the pulling velocity; differs where asperities are elastic.
+        Velocity of slip over the pulling velocity; differs where asperities are elastic. A law
+        without rate dependence does not determine it: both velocities are then 1.
     age : array or None
         Age of the contacts over that of steady sliding, V Phi/D0; None where the law's state is no
-        age, or the load is not harmonic.
+        age, or the load is not harmonic; NaN while the interface sticks, where the force does not
+        tell the age.
     """
 
     phase: Float
