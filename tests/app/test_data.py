@@ -23,7 +23,7 @@ from asperity.errors import Argument, InputError, naming, symbol
 from asperity.inference.answers import read_data
 from asperity.laws.registry import symbols_of
 from asperity.outputs.sections import Section
-from asperity.questions import fit as questions
+from asperity.questions import fit as questions, recording as questions_of_recordings
 from references.spring_slider import spring_slider
 
 MU1, PHASE1 = 0.012, -0.4
@@ -569,6 +569,36 @@ def test_a_fit_of_the_page_is_copied_as_texts_that_ask_the_same(steps, monkeypat
         assert data.window == tuple(run.window)
         assert data.steps == tuple(run.steps)
         assert data.source.units == run.source.units
+
+
+def test_a_copied_command_carries_the_units_of_numbers_in_si():
+    numbers = {
+        "fixed": {"K": 2e5}, "start": {"A": 0.01, "D0": 1e-6},
+        "prior": {"W0": {"mean": "7 N", "std": 0.1}, "D0": {"mean": "1 um", "std": "100 nm"}},
+    }  # fmt: skip
+    command = fits._texts(fits.Fitted(laws=["rice-ruina"], **numbers), [])["command"]
+    for option in (
+        "--fix 'K=200000.0 N/m'", "--start A=0.01", "--start 'D0=1e-06 m'",
+        "--prior 'W0=7+-0.1 N'", "--prior 'D0=1e-06+-1e-07 m'",
+    ):  # fmt: skip
+        assert option in command
+
+
+def test_recordings_with_different_options_have_no_common_command():
+    runs = [{"recording": key, "window": window} for key, window in (("a", "1:2"), ("b", "3:4"))]
+    texts = fits._texts(fits.Fitted(laws=["rice-ruina"], runs=runs), ["a.csv", "b.csv"])
+    assert texts["command"].startswith("# no command")
+    assert "(3.0, 4.0)" in texts["python"]
+
+
+def test_the_copied_python_of_an_open_window_runs():
+    question = questions_of_recordings.Measurement(window="1:")
+    text = recordings._python("a.csv", recordings.Source(area="1 cm^2"), question, modulated=True)
+    imports = "\n".join(line for line in text.splitlines() if "import" in line)
+    names = {}
+    exec(imports, names)
+    assert "window=(1.0, inf)" in text
+    assert {"inf", "stress_to_force"} <= set(names)
 
 
 @pytest.mark.parametrize(

@@ -25,14 +25,16 @@ from asperity.app.words import in_labels
 from asperity.app.worker import limited
 from asperity.arrays import Float
 from asperity.errors import naming, require
+from asperity.operating_point import known_parameters
 from asperity.outputs.sections import records
-from asperity.parameters import Names
+from asperity.parameters import Names, canonical_name
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
 from asperity.questions.record import Span, Times, Whole
 from asperity.questions.recording import Velocities
 from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
+from asperity.units import to_si
 
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
@@ -380,11 +382,42 @@ def _python(
     return "\n".join(lines) + "\n"
 
 
+def _with_units(question: Fitted, chosen: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Fixed numbers, start values and priors as texts, which carry their units in a command."""
+    known = known_parameters(question.laws[0])
+
+    def text(name: str, value: Any) -> Any:
+        parameter = known.get(canonical_name(name, known) or "")
+        if parameter is None or type(value) not in (int, float):
+            return value
+        return f"{value!r} {parameter.unit}".rstrip()
+
+    def prior(name: str, given: Mapping[str, Any] | None) -> dict[str, Any] | None:
+        if given is None:  # of a material
+            return None
+        texts = {end: str(text(name, value)) for end, value in given.items()}
+        if len({value.partition(" ")[2] for value in texts.values()}) == 1:
+            return texts
+        # The option has one unit for both.
+        kind = known[canonical_name(name, known) or name].kind
+        return {end: text(name, to_si(value, kind, name)) for end, value in given.items()}
+
+    words = {"fixed": text, "start": text, "prior": prior}
+    return {
+        field: {name: of(name, value) for name, value in chosen[field].items()}
+        for field, of in words.items()
+        if field in chosen
+    }
+
+
 def _command(question: Fitted, chosen: Mapping[str, Any], files: list[str]) -> str:
+    readings = [run.model_dump(exclude={"recording"}) for run in question.runs]
+    if any(reading != readings[0] for reading in readings):
+        return "# no command reads these recordings with different options: copy as Python"
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
     parts += [f"--law {law}" for law in question.laws]
-    # Recordings may have different options; the command shows those of the first recording.
+    chosen = {**chosen, **_with_units(question, chosen)}
     for run in question.runs[:1]:
         parts += source_options(run.source)
         chosen = {**chosen, **run.model_dump(include={"window", "steps", "velocities"})}

@@ -6,6 +6,7 @@ A new process reads each file; it imports modules late to start quickly.
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -204,8 +205,10 @@ def _python(name: str, source: Source, question: questions.Measurement, *, modul
     """The same measurement as Python."""
     reading = "".join(f", {k}={v!r}" for k, v in source.arguments.items())
     lines = ["import asperity as asp", "", f"trace = asp.read({name!r}{reading})"]
+    if any(map(math.isinf, question.window or ())):
+        lines.insert(0, "from math import inf\n")
     if source.area:
-        lines.insert(1, "from asperity.recording import stress_to_force")
+        lines.insert(-2, "from asperity.recording import stress_to_force")
         lines.append(f"trace = stress_to_force(trace, {source.area!r})")
     fields = question.model_dump(exclude={"modulated", "exact_frequency"}, exclude_defaults=True)
     words = {"whole_periods": "only_whole_periods"}
