@@ -211,6 +211,12 @@ class Sweep(Point):
         return columns
 
     @property
+    def single_columns(self) -> list[str]:
+        """Axes of one column; a column that varies together with others may be a label."""
+        axes = self.axes.items()
+        return [n for n, axis in axes if axis.values is not None or axis.from_ is not None]
+
+    @property
     def laws(self) -> list[str]:
         """Laws as the plan writes them, in their order."""
         return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]

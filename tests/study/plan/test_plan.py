@@ -102,6 +102,36 @@ def test_no_value_of_a_plan_is_beyond_a_sentence(fields: dict[str, object], mess
         SweepGrid.of(SweepPlan.of_content(plan, "plan"))
 
 
+@pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ({"parameters": {"K": "0.3 N/um"}}, "parameters.K"),
+        ({"axes": {"K": {"values": ["0.2 N/um", "0.3 N/um"]}}}, "axes.K"),
+        ({"axes": {"K/Kc": {"values": [0.5, 1.5]}}}, "axes.K/Kc"),
+    ],
+)
+def test_a_threshold_of_the_stiffness_refuses_a_stiffness(fields, place) -> None:
+    axes = {"epsilon": {"values": [0.1]}}
+    parameters = {"V": "1 um/s", "frequency": "120 Hz", **fields.get("parameters", {})}
+    plan = SweepPlan(
+        law="rice-ruina", material="bureau2000", solve="threshold",
+        **{"axes": axes, **fields, "parameters": parameters},
+    )  # fmt: skip
+    with pytest.raises(InputError, match=f"{place} must be left out where its threshold"):
+        SweepGrid.of(plan)
+
+
+def test_a_number_of_a_transient_has_times_in_order() -> None:
+    number = {"of": "friction", "take": "mean", "from": "2 s", "to": "1 s"}
+    table = {"steps": ["slide for 3 s"], "numbers": {"late": number}, "sampling": "5 Hz"}
+    axes = {"V": {"values": ["1 um/s"]}}
+    plan = SweepPlan(
+        law="rice-ruina", material="bureau2000", solve="transient", transient=table, axes=axes
+    )
+    with pytest.raises(InputError, match=r"late must have a 'from' before its 'to', got 2 s and"):
+        SweepGrid.of(plan)
+
+
 def test_an_unknown_law_is_the_one_mistake_of_a_plan() -> None:
     """The parameters, which the law that was meant may have, are no second mistake."""
     axes = {"K": {"values": (1e5, 2e5)}}

@@ -9,12 +9,15 @@ import numpy as np
 
 from asperity.errors import require
 from asperity.laws import Law
-from asperity.parameters import Output
+from asperity.parameters import MACHINE, Output, canonical_name
 from asperity.questions.sweep import Sweep
-from asperity.study.points import Answers, Points
+from asperity.study.points import RATIOS, Answers, Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
+
+#: The stiffness, and the ratio that determines it.
+_SOUGHT = {"K": MACHINE["K"], "stiffness_ratio": RATIOS["stiffness_ratio"].parameter}
 
 
 class ThresholdSolve(SolveKind):
@@ -39,6 +42,11 @@ class ThresholdSolve(SolveKind):
         low, high = plan.threshold.between
         rule, got = "go from a softer to a stiffer spring", f"{low:g} to {high:g}"
         require(0 < low < high, "threshold.between", rule, got, "write it like [0.3, 4.0]")
+        for place, names in (("parameters", plan.parameters), ("axes", plan.single_columns)):
+            for name in names:
+                rule, got = "be left out where its threshold is sought", f"'{name}'"
+                sought, advice = canonical_name(name, _SOUGHT), "choose threshold.between"
+                require(sought is None, f"{place}.{name}", rule, got, advice)
         return {"between": [low, high], "scan": plan.threshold.scan}
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:

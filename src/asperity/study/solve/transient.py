@@ -157,6 +157,9 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
         side: None if value is None else number(value, f"{place}.{side}", "time", "not negative")
         for side, value in (("from", entry.from_), ("to", entry.to))
     }
+    first, last = times["from"] or 0.0, times["to"]
+    rule, got = "have a 'from' before its 'to'", f"{first:g} s and {last or 0.0:g} s"
+    require(last is None or first <= last, place, rule, got, "exchange them")
     return {"of": entry.of, "take": entry.take, **times}
 
 
@@ -164,12 +167,7 @@ def _require_drive_in_steps(plan: Sweep, table: TransientTable) -> None:
     """Refuse a modulation that no step uses: only steps move the load and the pull."""
     used = {name for line in table.steps for _, name, *_ in string.Formatter().parse(line)}
     given = {n: f"parameters.{n}" for n, value in plan.parameters.items() if value}
-    # A column that varies together with others may be a label.
-    given |= {
-        name: f"axes.{name}"
-        for name, axis in plan.axes.items()
-        if axis.values is not None or axis.from_ is not None
-    }
+    given |= {name: f"axes.{name}" for name in plan.single_columns}
     for written, place in given.items():
         name = canonical_name(written, {"epsilon": DRIVE["epsilon"], **MODULATION})
         rule, advice = "stand in a step", "write it into one, in braces, or leave it out"
