@@ -449,3 +449,20 @@ def test_the_rules_for_the_machine_are_those_of_the_slider(
     assert verdict(lambda: point_parameters(type(law))[name].check(value)) == verdict(
         lambda: Slider(law, **given)
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"alpha": 0.2}, "alpha.*must be a number of a law of"),
+        ({"V": 2e-6}, "V.*must fill a cell of"),
+        ({"M": 2.0}, "M.*must have an influence"),
+    ],
+)
+def test_a_given_number_that_no_row_uses_is_refused(tmp_path: Path, given, message) -> None:
+    columns = ["V", "epsilon"]
+    source = write(tmp_path / "in.csv", [{"V": 1e-6, "epsilon": 0.2}, {"V": 1e-5}], columns)
+    filled = {n: v for n, v in POINT.items() if n not in ("M", "V")} | given
+    with pytest.raises(InputError, match=message):
+        run_table(source, tmp_path / "out.csv", law="rice-ruina", filled=filled, given=given)
+    run_table(source, tmp_path / "out.csv", law="rice-ruina", filled=filled, given=["epsilon"])

@@ -231,10 +231,13 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     from asperity.study.table import run_table
 
     law = get_law(point.law).name if point.law else None
-    filled = sourced_numbers(point.parameters, material_of(point), law=law)
+    filled = sourced_numbers(point.parameters, material_of(point), "command line", law)
     values = {name: number.value for name, number in filled.items()}
+    given = [name for name, number in filled.items() if number.origin == "command line"]
     with bar("point", "responses") as update:
-        done = run_table(table, out, law=law, filled=values, resume=resume, progress=update)
+        done = run_table(
+            table, out, law=law, filled=values, given=given, resume=resume, progress=update
+        )
     output.answer(
         lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)},
         lambda: [Section("", (f"{count_text(done.rows, 'row')} in {out}",))],

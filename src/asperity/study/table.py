@@ -15,16 +15,16 @@ import hashlib
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, get_law, registered
-from asperity.operating_point import known_parameters
+from asperity.operating_point import known_parameters, require_influence
 from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
@@ -66,6 +66,7 @@ def run_table(
     *,
     law: str | None = None,
     filled: Mapping[str, float] | None = None,
+    given: Iterable[str] = (),
     resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
     block: int = _CHUNK,
@@ -80,6 +81,8 @@ def run_table(
         Law of the rows without a law.
     filled : mapping of str to float, optional
         SI numbers for missing columns and empty cells, by column name.
+    given : iterable of str
+        Numbers of `filled` that must not be without influence: the user has given them.
     resume : bool
         Whether to continue an interrupted table, if there is one.
     progress : callable, optional
@@ -90,14 +93,14 @@ def run_table(
     Raises
     ------
     InputError
-        If the table as a whole cannot be used or `out` cannot be written. A bad row raises no
-        error; its column ``result`` has the reason.
+        If the table as a whole cannot be used, no row uses a number of `given`, or `out` cannot be
+        written. A bad row raises no error; its column ``result`` has the reason.
     Interrupted
         On Ctrl-C.
     """
     filled = dict(filled or {})
     out = output_file(out, inputs={"table": source})
-    table = TableSource(source, law, filled)
+    table = TableSource(source, law, filled, given)
     output = UnfinishedText(out, {"table": table.digest, "law": law, "filled": filled})
     output.start(resume)
     with output.interruptible(lambda: f"{output.rows} of {table.rows} rows"):
@@ -169,6 +172,8 @@ class TableSource:
         Law of the rows without a law.
     filled : mapping of str to float
         SI numbers for missing columns and empty cells, by name.
+    given : iterable of str
+        As for `run_table`.
 
     Attributes
     ----------
@@ -190,7 +195,13 @@ class TableSource:
         If the table cannot be read, has no rows, or lacks a column that all its laws need.
     """
 
-    def __init__(self, path: Path, law: str | None, filled: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        law: str | None,
+        filled: Mapping[str, float],
+        given: Iterable[str] = (),
+    ) -> None:
         self.path, self.law, self.filled = path, law or "", filled
         require_rereadable(path, "table")
         parameters = known_parameters()
@@ -201,12 +212,15 @@ class TableSource:
         require(named, str(path), rule, "an empty file", advice)
         self.columns, self.units = _checked_header(self.header, str(path))
         laws: Counter[str] = Counter()
+        #: Columns of given numbers without an empty cell so far.
+        full = {name for name in given if name in self.columns}
         #: For each column without a number so far, its first text and the row of this text.
         texts = {name: ("", 0) for name in self.columns if name != "law"}
         for count, row in enumerate(self._sheet.rows(), 1):
             laws[self.law_of(row)] += 1
+            full = {name for name in full if self._cell(row, name)}
             for name in tuple(texts):
-                cell = "".join(row[self.columns[name] :][:1]).strip()
+                cell = self._cell(row, name)
                 if math.isfinite(_number(cell, parameters[name])):
                     del texts[name]
                 elif cell and not texts[name][0]:
@@ -215,6 +229,7 @@ class TableSource:
         rule = "have rows of data"
         require(self.rows, str(path), rule, "only column names", "give one operating point a row")
         self._require_columns(list(laws), texts)
+        self._require_use(given, list(laws), full)
         with path.open("rb") as file:
             self.digest = hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -223,6 +238,21 @@ class TableSource:
         rows = islice(self._sheet.rows(), skip, None)
         while block := list(islice(rows, size)):
             yield block
+
+    def _cell(self, row: Row, name: str) -> str:
+        return "".join(row[self.columns[name] :][:1]).strip()
+
+    def _require_use(self, given: Iterable[str], laws: Sequence[str], full: set[str]) -> None:
+        """Refuse a given number that no row uses; `full` are columns without an empty cell."""
+        known = [law for name, law in registered().items() if name in laws]
+        of_laws = {name for law in known for name in point_parameters(law)}
+        for name in given:
+            field, advice = Argument("numbers", name), "leave it out"
+            rule = f"be a number of a law of {self.path}"
+            require(name in of_laws, field, rule, ", ".join(laws), advice)
+            rule, got = f"fill a cell of {self.path}", "a number in every row"
+            require(name not in full, field, rule, got, "leave it out, or the column")
+        require_influence(given, {**self.filled, **dict.fromkeys(self.columns, 1.0)})
 
     def law_of(self, row: Row) -> str:
         """Name of the law of a row, or "" if it has none."""
