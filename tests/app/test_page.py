@@ -78,6 +78,9 @@ def test_a_wrong_number_is_told_in_a_sentence_and_undone(visit):
     field.press("Enter")
     message = page.locator(".message", has_text="V must be positive")
     message.wait_for()
+    field.fill("1,000 um/s")  # a thousand, or one?
+    field.press("Enter")
+    page.locator(".message", has_text="without commas").wait_for()
     field.fill("2 mm/min")  # a unit that only the server knows
     field.press("Enter")
     message.wait_for(state="hidden")

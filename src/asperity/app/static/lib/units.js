@@ -47,9 +47,12 @@ export function quantity(value, kind, count = 4) {
 
 /** SI value of a text, or null where only the server may know its unit. */
 export function parse(text, kind) {
+  // Three digits after a comma may be thousands, which the server refuses in words.
+  if (/\d,\d{3}(?!\d)/.test(text)) return null;
   const match = /^\s*([-+−]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)$/.exec(text.replace(",", "."));
   if (!match) return null;
   const number = Number(match[1].replace("−", "-"));
+  if (!Number.isFinite(number)) return null;
   const unit = plain(match[2]);
   const { ladder } = kinds[kind];
   if (kind === "dimensionless") {
@@ -58,7 +61,7 @@ export function parse(text, kind) {
   }
   const step = ladder.find(([name]) => plain(name) === unit);
   // Divided, so that 1 um is the double 1e-6.
-  if (!step || !Number.isFinite(number)) return null;
+  if (!step) return null;
   return step[1] < 0 ? number / 10 ** -step[1] : number * 10 ** step[1];
 }
 
