@@ -1,5 +1,7 @@
 """Designs of periodic responses: what they expect is what fits to such readings find."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -134,7 +136,13 @@ def test_the_record_and_the_table_hold_the_points(result):
     assert row["law"] == "elasto-plastic"
     assert row["A"] == 0.013
     assert row["W0"] == 3.0
-    assert "eps_ratio" not in row
+    assert not {"eps_ratio", "inertia"} & set(row)
+
+
+def test_the_table_of_a_design_with_inertia_counts_the_mass(result):
+    question = result.plan.question.model_copy(update={"inertia": True})
+    heavy = replace(result, plan=replace(result.plan, question=question))
+    assert {row["inertia"] for row in heavy.rows()} == {1}
 
 
 #: One operating point of which three observables leave one combination of two parameters.

@@ -263,13 +263,15 @@ class Design(Warned):
     def rows(self) -> list[dict[str, Any]]:
         """The points as rows of a table that ``asperity response --table`` reads.
 
-        Columns: law, all parameters in SI, `readings`, `predicted_NAME` of each observable and
-        `NAME_err`, the standard uncertainty of one reading. `epsilon` is the applied amplitude; the
-        contacts carry eps_ratio times this amplitude.
+        Columns: law, all parameters in SI, ``inertia`` = 1 if the mass counts, `readings`,
+        `predicted_NAME` of each observable and `NAME_err`, the standard uncertainty of one reading.
+        `epsilon` is the applied amplitude; the contacts carry eps_ratio times this amplitude.
         """
         truth = self.plan.truth
         constants = {**truth.fixed, **expected_values(truth)}
         constants.pop("eps_ratio", None)
+        if self.plan.question.inertia:
+            constants["inertia"] = 1
         rows = []
         for p in self.points:
             row: dict[str, Any] = {"law": truth.law.name, **p.setting}
