@@ -273,3 +273,14 @@ def test_unstable_responses_are_no_readings(pmma):
         assert result.values["A"] == pytest.approx(float(law.A), rel=1e-3)
         said = [w for w in result.warnings if "9 of 9 rows is unstable" in w]
         assert len(said) == (name == "-")
+
+
+@pytest.mark.parametrize(("name", "option"), [("inertia", "inertia"), ("eta", "radiation_damping")])
+def test_a_column_of_the_motion_is_not_left_out_of_a_fit(name, option):
+    columns = {
+        "V": [1e-6, 1e-6], "epsilon": [0.1, 0.2], "frequency": [120.0, 120.0], name: [1.0, 1.0],
+        "mu1": [1e-4, 2e-4], "mu1_err": [1e-5, 1e-5],
+    }  # fmt: skip
+    material = asp.materials.load("bureau2000")
+    with pytest.raises(InputError, match=f"{option}.* must agree with the column '{name}'"):
+        asp.fit(asp.inference.table_of(columns), "rice-ruina", ["A"], material=material)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from asperity.arrays import Bool, Float
-from asperity.errors import named
+from asperity.errors import Argument, named, require
 from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
 from asperity.inference.tables.residuals import (
     Prediction,
@@ -74,6 +74,15 @@ def outlier_sentence(rows: NDArray[np.str_]) -> list[str]:
     ]
 
 
+def _require_motion_of_rows(table: LockInTable, motion: Mapping[str, bool]) -> None:
+    """Refuse a table whose columns count inertia or damping where the fit does not."""
+    for name, option in (("inertia", "inertia"), ("eta", "radiation_damping")):
+        counted = np.nan_to_num(table.points.get(name, 0.0)) > 0
+        rule, got = f"agree with the column '{name}' of {table.name}", "False"
+        advice = f"add {Argument(option, value='True')}, or remove the column"
+        require(motion[option] or not counted.any(), option, rule, got, advice)
+
+
 class LockInTerm(DataTerm):
     """A table of lock-in readings as a `DataTerm` of an objective.
 
@@ -116,6 +125,7 @@ class LockInTerm(DataTerm):
         self.table, self.law = table, law
         self.name, self.observables = table.name, table.observables
         self.motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
+        _require_motion_of_rows(table, self.motion)
         self.fixed = {
             n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
         }
