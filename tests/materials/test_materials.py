@@ -265,3 +265,14 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "latin.toml").write_bytes(b"title = '\xe9'")
     with pytest.raises(InputError, match="it is not UTF-8 text"):
         materials.load(tmp_path / "latin.toml")
+
+
+def test_a_law_takes_no_number_of_another_kind_of_quantity(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = GOOD.replace("numbers.K", "numbers.D0").replace("stiffness", "dimensionless")
+    path.write_text(text.replace("kN/m", ""), encoding="utf-8")
+    given = {"mu0": 0.6, "A": 0.01, "B": 0.02, "V0": "1 um/s"}
+    with pytest.raises(InputError, match=r"rice-ruina.D0 must be a length, got '3 \+- 0.5' in 'mi"):
+        materials.load(path).law("rice-ruina", **given)
+    law = materials.load(path).law("rice-ruina", D0="3 um", **given)
+    assert float(law.D0) == 3e-6

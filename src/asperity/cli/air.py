@@ -111,9 +111,10 @@ def _numbers(
         one_of(symbol(name), map(symbol, known), "--set")
         numbers[name] = number(text, field, known[name].kind, "positive")
     for name, parameter in known.items():
-        published = parameter.name
-        if name not in (*numbers, unknown) and material is not None and published in material:
-            numbers[name] = material[published].si
+        published = material[parameter.name] if material and parameter.name in material else None
+        # As for operating points, a number of another kind of quantity is not the parameter.
+        if name not in (*numbers, unknown) and published and published.dimension == parameter.kind:
+            numbers[name] = published.si
     missing = [name for name in known if name not in (*numbers, unknown)]
     if missing:
         raise without_numbers("air", missing, known)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import Argument, InputError, require, symbol, symbols
-from asperity.laws import Law
-from asperity.materials import Material
-from asperity.parameters import Parameter, point_parameters, suggestion
+from asperity.laws import Law, registered
+from asperity.materials import Material, Number
+from asperity.parameters import Parameter, all_parameters, point_parameters, suggestion
 from asperity.parameters.arguments import number, typed
 
 #: Share of the applied modulation that the contacts carry; only fits have this parameter.
@@ -315,8 +315,18 @@ def require_free_names(
 
 def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:
     """Published values of a material, by name in SI."""
-    known = () if material is None else [n for n in names if n in material]
-    return {n: material[n].si for n in known if material[n].value is not None}  # type: ignore[index]
+    return {n: number.si for n, number in _published(material, names).items()}
+
+
+def _published(material: Material | None, names: Iterable[str]) -> dict[str, Number]:
+    """Numbers of a material that have a value and are the kind of quantity of the parameter."""
+    kinds = {n: p.kind for n, p in all_parameters(registered().values()).items()}
+    numbers = {n: material[n] for n in names if n in material} if material is not None else {}
+    return {
+        n: number
+        for n, number in numbers.items()
+        if number.value is not None and number.dimension == kinds.get(n, number.dimension)
+    }
 
 
 def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:
@@ -327,11 +337,11 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
     InputError
         If the material has no number with an uncertainty for any of the names.
     """
-    priors = {}
-    for name in names:
-        if name in material and material[name].uncertainty:
-            published = material[name]
-            priors[name] = Prior(published.si, float(published.si_uncertainty or 0), material.name)
+    priors = {
+        name: Prior(published.si, float(published.si_uncertainty or 0), material.name)
+        for name, published in _published(material, names).items()
+        if published.uncertainty
+    }
     got, advice = f"'{material.name}', which has none for {symbols(names)}", "leave the prior out"
     require(priors, "prior", "be a material with uncertainties of free parameters", got, advice)
     return priors

@@ -217,7 +217,8 @@ class Material(Question):
         ------
         InputError
             If the law or a parameter is unknown, a value has the wrong unit or sign, or the law
-            needs a parameter that neither the material nor `overrides` has.
+            needs a parameter that neither the material nor `overrides` has, or that is another
+            kind of quantity in the material.
         """
         # The laws load JAX, which reading numbers does not need.
         from asperity.laws import get_law
@@ -233,11 +234,12 @@ class Material(Question):
             got = f"nothing and '{self.name}' has no such number"
             advice = f"write {parameter}=... after the law's name"
             require(parameter in {**self.numbers, **given}, label, "be given", got, advice)
-            values[about.path.rpartition(".")[2]] = (
-                about.check(given[parameter], label)
-                if parameter in given
-                else self.numbers[parameter].si
-            )
+            if parameter not in given:
+                number = self.numbers[parameter]
+                fits, rule = number.dimension == about.kind, f"be {KINDS[about.kind].noun}"
+                require(fits, label, rule, f"'{number}' in '{self.name}'", advice)
+                given[parameter] = number.si
+            values[about.path.rpartition(".")[2]] = about.check(given[parameter], label)
         return law(**values)
 
 
