@@ -176,6 +176,7 @@ def test_hertz_is_refused_where_an_angular_frequency_is_meant() -> None:
         ("1 N", "dimensionless", "a pure number", "0.24"),
         ("2 Hz*Hz", "frequency", "a frequency (Hz)", "120 Hz"),
         ("20 degC", "temperature", "a temperature (K)", "300 K"),
+        ("3 dB", "dimensionless", "a pure number", "0.24"),
     ],
 )
 def test_the_wrong_dimension_is_told_with_the_right_one(

@@ -84,7 +84,11 @@ def _factor_by_pint(unit: str, kind: str) -> Decimal:
         raise _UnitError(", which has a unit", f"give a ratio, like '{spec.example}'")
     if root != si_root:
         raise _UnitError
-    if registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0:
+    try:
+        shifted = registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0
+    except TypeError:  # the logarithm of a decimal, as of dB
+        raise _UnitError(", which is logarithmic") from None
+    if shifted:
         raise _UnitError(", which has an offset")
     return EXACT.divide(Decimal(factor), Decimal(si_factor))
 
