@@ -189,6 +189,10 @@ def test_linker_dieterich_forms_are_high_frequency_limits(alpha):
         np.testing.assert_allclose(
             cf.mean_shift_linker_dieterich(p, 1.0), cf.mean_shift(p, 1.0), rtol=1e-12
         )
+        ageless = central(B=0.0)
+        np.testing.assert_allclose(
+            cf.mean_shift_linker_dieterich(ageless, 1.0), cf.mean_shift(ageless, 1.0), rtol=1e-12
+        )
 
 
 def test_elastic_asperities_have_a_plateau_at_low_velocity():

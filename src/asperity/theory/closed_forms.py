@@ -171,7 +171,7 @@ def first_harmonic(p: SmallModulation, epsilon: ArrayLike) -> Array:
 
 @typed
 def second_harmonic(p: SmallModulation, epsilon: ArrayLike, form: Form = "derived") -> Array:
-    """mu2 at high frequency, Eq. (21).
+    """mu2 at high frequency, Eq. (21), of alpha = 0.
 
     Derived: (V K/(omega W0)) mu (mu + 2A)/(8 A^2) eps^2; printed: with mu^2/(2 A^2) in its place.
     """
@@ -191,7 +191,10 @@ def second_harmonic_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> 
 
 @typed
 def mean_shift(p: SmallModulation, epsilon: ArrayLike) -> Array:
-    """Change of the mean friction coefficient at high frequency, Eq. (22), negative."""
+    """Change of the mean friction coefficient at high frequency, Eq. (22), negative.
+
+    It is that of alpha = 0; see `mean_shift_linker_dieterich` for another alpha.
+    """
     return -p.mu * (p.mu + 2 * p.A) / (4 * p.A) * jnp.square(epsilon)
 
 
@@ -201,7 +204,9 @@ def mean_shift_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> Array
 
     -[(mu - alpha)^2/(4A) + mu/2 - alpha^2/(4B)] eps^2.
     """
-    curvature = (p.mu - p.alpha) ** 2 / (4 * p.A) + p.mu / 2 - p.alpha**2 / (4 * p.B)
+    # Zero rather than 0/0 for a law without alpha and B.
+    age = jnp.where(p.alpha == 0, 0.0, p.alpha**2 / jnp.where(p.alpha == 0, 1.0, 4 * p.B))
+    curvature = (p.mu - p.alpha) ** 2 / (4 * p.A) + p.mu / 2 - age
     return -curvature * jnp.square(epsilon)
 
 
@@ -219,7 +224,7 @@ def age_to_velocity_ratio(p: SmallModulation, form: Form = "derived") -> Array:
 
 @typed
 def velocity_modulation(p: SmallModulation, epsilon: ArrayLike) -> Array:
-    """Relative modulation of the velocity at high frequency, eps mu/A, Eq. (24).
+    """Relative modulation of the velocity at high frequency, eps mu/A, Eq. (24), of alpha = 0.
 
     The parameter that has to be small for perturbation theory to hold.
     """
