@@ -109,9 +109,10 @@ def test_text_is_read_to_the_nearest_double(number: float, rung: tuple[str, str,
 @given(value=finite, rung=st.sampled_from(RUNGS))
 def test_to_a_unit_and_back(value: float, rung: tuple[str, str, int]) -> None:
     kind, unit, _ = rung
-    # Two roundings to a double, each of half a unit in the last place.
+    # Two roundings to a double and two to its shortest decimal, each of half a unit of the last
+    # place.
     shown = from_si(value, unit, kind)
-    assert to_si(f"{shown!r} {unit}", kind, "slider.x") == pytest.approx(value, rel=2.3e-16)
+    assert to_si(f"{shown!r} {unit}", kind, "slider.x") == pytest.approx(value, rel=4.5e-16)
 
 
 @given(value=st.floats(min_value=1e-15, max_value=1e12), kind=st.sampled_from(list(KINDS)))
@@ -323,3 +324,21 @@ def test_a_number_with_too_few_digits_is_refused(text: str) -> None:
 def test_each_kind_has_a_dimension_of_its_own() -> None:
     for name, kind in KINDS.items():
         assert kind_of_dimension(base_units(kind.si)[1]) == name
+
+
+def test_quantities_of_other_packages_keep_their_unit() -> None:
+    registry = pint.UnitRegistry()
+    assert to_si(registry.Quantity(0.2, "N/um"), "stiffness", "slider.spring") == 2e5
+    labelled = xr.DataArray([0.2, 0.3], attrs={"units": "N/um"})
+    for values in (labelled, registry.Quantity([0.2, 0.3], "N/um")):
+        np.testing.assert_allclose(to_si(values, "stiffness", "slider.spring"), [2e5, 3e5])
+    shares = xr.DataArray([0.1], attrs={"units": "1"})
+    np.testing.assert_array_equal(to_si(shares, "dimensionless", "epsilon"), [0.1])
+    for wrong in (registry.Quantity(3, "kg"), registry.Quantity(5, "deg")):
+        with pytest.raises(InputError, match="must be"):
+            to_si(wrong, "dimensionless", "tilt")
+
+
+def test_masked_numbers_are_no_numbers() -> None:
+    with pytest.raises(InputError, match="must be finite"):
+        to_si(np.ma.array([1.0, 2.0], mask=[False, True]), "length", "D0")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any, overload
 
@@ -35,7 +36,8 @@ def to_si(value: Any, kind: str, name: str) -> Any:
     Parameters
     ----------
     value : str, number, array or sequence of these
-        A text carries its unit (``"1 um/s"``); a number or an array is taken as SI.
+        A text carries its unit (``"1 um/s"``), and so do quantities of pint and astropy, and arrays
+        of xarray with the attribute ``units``; a number or another array is taken as SI.
     kind : str
         A key of `KINDS`.
     name : str
@@ -57,6 +59,8 @@ def to_si(value: Any, kind: str, name: str) -> Any:
         return _text_to_si(value, kind, name)
     if is_traced(value):
         return value
+    if (quantity := _number_and_unit(value)) is not None:
+        return _quantity_to_si(*quantity, kind, name)
     if getattr(getattr(value, "dtype", None), "kind", None) in ("U", "O"):
         return to_si(np.asarray(value).tolist(), kind, name)
     if isinstance(value, list | tuple):
@@ -178,7 +182,30 @@ def _stacked(rows: list[Any], name: str) -> Any:
         raise InputError(name, rule, got, "give every row the same length") from None
 
 
+def _number_and_unit(value: Any) -> tuple[Any, str] | None:
+    """Number and unit of a quantity of another package; None for a value without a unit."""
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # pint
+        return value.magnitude, str(value.units)
+    if hasattr(value, "value") and hasattr(value, "unit"):  # astropy
+        return value.value, str(value.unit)
+    attributes = getattr(value, "attrs", None)
+    unit = attributes.get("units") if isinstance(attributes, Mapping) else None
+    # Of a pure number datasets have the unit "1", of an angle "rad".
+    if not isinstance(unit, str) or unit in ("", "1", "rad"):
+        return None
+    return np.asarray(value), unit  # xarray
+
+
+def _quantity_to_si(number: Any, unit: str, kind: str, name: str) -> Any:
+    value = to_si(number, kind, name)
+    if not np.ndim(value):
+        return _text_to_si(f"{float(value)!r} {unit}", kind, name)
+    return scaled(value, unit_factor(normalised(unit), kind, name, printable(unit, _SHOWN)))
+
+
 def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
+    if isinstance(value, np.ma.MaskedArray):
+        value = np.ma.filled(value.astype(float), np.nan)
     array = np.asarray(value)
     if array.dtype.kind not in "iuf":
         raise InputError(
