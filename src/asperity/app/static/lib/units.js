@@ -48,7 +48,7 @@ export function quantity(value, kind, count = 4) {
 /** SI value of a text, or null where only the server may know its unit. */
 export function parse(text, kind) {
   // Three digits after a comma may be thousands, which the server refuses in words.
-  if (/\d,\d{3}(?!\d)/.test(text)) return null;
+  if (/(?<!\d)[1-9]\d{0,2},\d{3}(?!\d)/.test(text)) return null;
   const match = /^\s*([-+−]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)$/.exec(text.replace(",", "."));
   if (!match) return null;
   const number = Number(match[1].replace("−", "-"));
