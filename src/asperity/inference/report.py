@@ -59,7 +59,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     sentences = [f"These numbers are doubtful: {'; '.join(fit.doubts)}."] if fit.doubts else []
     difference = fit.rate_dependence
     if difference is not None:
-        sentences.append(f"{symbol('A - B')} = {difference.shown}: {difference.meaning}")
+        sentences.append(f"{symbol(difference.name)} = {difference.shown}: {difference.meaning}")
     if fit.level_change is not None:
         value, error, steps = fit.level_change
         which = "its step" if steps == 1 else f"its {steps} steps"

@@ -8,10 +8,13 @@ from scipy.stats import chi2
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.fit_report.bands import bands_of
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.answers import answer_fit
-from asperity.inference.fitting.inputs import fixed_values, free_by_default
-from asperity.inference.fitting.result import Optimum, fit_record
+from asperity.inference.comparison.compare import what_would_tell
+from asperity.inference.fitting.inputs import fixed_values, free_by_default, priors_of
+from asperity.inference.fitting.result import Estimate, Optimum, fit_record
+from asperity.inference.objective import Objective
 from asperity.inference.report import quality
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
@@ -356,6 +359,23 @@ def test_a_column_of_one_of_two_tables_counts_in_its_rows(readings, pmma):
     np.testing.assert_array_equal(
         fixed["W0"], np.repeat([5.0, pmma.W0], [first.rows, without_load.rows])
     )
+
+
+def test_a_second_state_counts_in_the_slope_of_steady_friction():
+    law, zero = get_law("two-state"), (0.0, 0.0)
+    numbers = {"A": 0.012, "B": 0.01, "B2": 0.008}
+    errors = {"A": 3e-4, "B": 0.0, "B2": 4e-4}
+    estimates = {
+        n: Estimate(n, "", value, errors[n], zero, zero, False, None)
+        for n, value in numbers.items()
+    }
+    result = asp.inference.Fit(
+        law.name, True, "converged", estimates, Objective((), law, (), {}), np.eye(3)
+    )
+    slope = result.rate_dependence
+    assert (slope.name, slope.meaning) == ("A - B - B2", "velocity weakening")
+    assert (slope.value, slope.error) == pytest.approx((-0.006, 5e-4))
+    assert any(line.name == "A - B - B2" for line in result.summary()[1])
 
 
 def test_as_many_parameters_as_data_are_refused_except_one_of_one(pmma):

@@ -19,7 +19,7 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
 from asperity.outputs.sections import rounded, two_digits
-from asperity.parameters import point_parameters
+from asperity.parameters import law_parameters, point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit
 
@@ -133,19 +133,22 @@ class Optimum:
 
 
 class RateDependence(NamedTuple):
-    """A - B of a fit.
+    """A - B of a fit, the slope d mu_ss/d ln V; A - B - B2 of a law with two states.
 
     Attributes
     ----------
     value, error : float
-        A - B and its standard error, from the errors of A and B and their correlation.
+        The slope and its standard error, from the errors of its parts and their correlation.
     meaning : str
         Velocity weakening or strengthening, or that the sign is not determined.
+    name : str
+        "A - B" or "A - B - B2".
     """
 
     value: float
     error: float
     meaning: str
+    name: str = "A - B"
 
     @property
     def shown(self) -> str:
@@ -236,15 +239,22 @@ class Fit(Warned, Drawn):
     def rate_dependence(self) -> RateDependence | None:
         """A - B; None where the law has no A and B, or one of them is not determined.
 
-        None too if one of them is fixed to several values, one for each row of a table.
+        A second state adds its coefficient, B2. None too if one of them is fixed to several values,
+        one for each row of a table.
         """
         signs = {"A": 1.0, "B": -1.0}
+        if "B2" in law_parameters(self.objective.law):
+            signs["B2"] = -1.0
+
+        def slope(values: Mapping[str, float]) -> float:
+            return sum(sign * values[n] for n, sign in signs.items())
+
         fixed = {n: np.unique(self.objective.fixed.get(n, ())) for n in signs}
         known = {n: float(v[0]) for n, v in fixed.items() if v.size == 1} | self.values
         free = [i for i, name in enumerate(self.parameters) if name in signs]
         if not free or not signs.keys() <= known.keys() - {*self.undetermined}:
             return None
-        value = known["A"] - known["B"]
+        value = slope(known)
         errors = np.array([signs[n] * p.se for n, p in self.parameters.items() if n in signs])
         variance = float(errors @ self.correlation[np.ix_(free, free)] @ errors)
         if not math.isfinite(variance):
@@ -254,10 +264,11 @@ class Fit(Warned, Drawn):
         near = [o.values for o in self.optima if o.chi2 - self.chi2 < _KNOWN_SIGN**2]
         others = [{**known, **values} for values in near]
         known_sign = abs(value) > _KNOWN_SIGN * error and all(
-            value * (other["A"] - other["B"]) > 0 for other in others
+            value * slope(other) > 0 for other in others
         )
         kind = "velocity weakening" if value < 0 else "velocity strengthening"
-        return RateDependence(value, error, kind if known_sign else "its sign is not determined")
+        meaning = kind if known_sign else "its sign is not determined"
+        return RateDependence(value, error, meaning, " - ".join(signs))
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -330,7 +341,7 @@ class Fit(Warned, Drawn):
         lines = [SummaryLine("doubtful", "; ".join(self.doubts))] if self.doubts else []
         if self.rate_dependence is not None:
             difference = self.rate_dependence
-            lines.append(SummaryLine("A - B", difference.shown, difference.meaning))
+            lines.append(SummaryLine(difference.name, difference.shown, difference.meaning))
         for name, p in {**self.parameters, **self.over_load}.items():
             if name.removesuffix("/W0") in self.undetermined:
                 lines.append(SummaryLine(name, NOT_DETERMINED, "by these data"))
