@@ -14,6 +14,7 @@ from asperity.inference import Prior, compare
 from asperity.inference.answers import read_data
 from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
+from asperity.inference.report import fit_in_words
 from asperity.inference.runs.run import RecordedRun
 from asperity.laws import RiceRuina
 from asperity.measurement.from_file import reads_cycles
@@ -213,3 +214,10 @@ def test_laws_are_compared_with_all_that_a_cycle_determines():
     for name, estimate in found.parameters.items():
         low, high = estimate.interval_95
         assert low < TRUTH[name] < high
+
+
+def test_an_assumed_level_of_friction_is_no_result():
+    """The report of a fit of cycles has no mu0: it would be the mean force of the cycle."""
+    fixed = {**LAW, "V": V, "W0": W0, "M": MACHINE["M"]}
+    words = fit_in_words(asp.fit(recorded(1), free=["K"], fixed=fixed, starts=0))
+    assert not [sentence for sentence in words if sentence.startswith("mu0")]

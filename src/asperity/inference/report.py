@@ -8,6 +8,7 @@ import numpy as np
 
 from asperity.errors import symbol, symbols, worded
 from asperity.inference.comparison.compare import Comparison, laws_table
+from asperity.inference.cycles import CycleTerm
 from asperity.inference.fitting.result import (
     MISFIT,
     NOT_DETERMINED,
@@ -69,8 +70,9 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
         )
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
-    # A fit of holds takes friction relative to sliding: its mu0 is assumed.
-    if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not fit.parts(HoldTerm):
+    # Fits of holds and of cycles take friction relative to a level: their mu0 is assumed.
+    assumed = fit.parts(HoldTerm) or fit.parts(CycleTerm)
+    if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not assumed:
         sentences.append(f"mu0 = {mu0[0]:.4g} at V0 = {quantity_text(V0[0], 'm/s')}")
     if fit.undetermined:
         sentences.append(f"not determined by these data: {symbols(fit.undetermined)}")
