@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +64,9 @@ def bands_of(fit: Fit, term: LockInTerm, posterior: Posterior | None) -> list[Se
     count = max(map(len, values.values()), default=1)
     table = term.table
     series = []
-    for label, rows in _series(table):
+    # A column that one of several tables lacks is complete among the fixed numbers.
+    settings = {n: term.fixed[n] for n in table.points if n in term.fixed}
+    for label, rows in _series(settings):
         row = int(np.flatnonzero(rows)[0])
         top = table.points["epsilon"][rows].max()
         epsilon = np.linspace(top / _AMPLITUDES, top, _AMPLITUDES)
@@ -91,11 +94,11 @@ def bands_of(fit: Fit, term: LockInTerm, posterior: Posterior | None) -> list[Se
     return series
 
 
-def _series(table: LockInTable) -> list[tuple[str, Bool]]:
+def _series(settings: Mapping[str, Float]) -> list[tuple[str, Bool]]:
     """Labels and rows of series, by everything but the amplitude."""
-    names = [n for n in ("V", "frequency", *table.points) if n != "epsilon"]
-    names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(table.points[n]).size > 1]
-    columns = np.stack([table.points[n] for n in names])
+    names = [n for n in ("V", "frequency", *settings) if n != "epsilon"]
+    names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(settings[n]).size > 1]
+    columns = np.stack([settings[n] for n in names])
     result = []
     for values in np.unique(columns, axis=1).T:
         label = ", ".join(_label(n, v) for n, v in zip(names, values, strict=True))

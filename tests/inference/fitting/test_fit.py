@@ -361,6 +361,22 @@ def test_a_column_of_one_of_two_tables_counts_in_its_rows(readings, pmma):
     )
 
 
+def test_predictions_of_two_tables_take_the_load_of_their_rows(readings, pmma):
+    """One table has a column of the load, the other has that of the material."""
+    half = np.arange(16) < 8
+    first, other = (readings(seed).without(half) for seed in (3, 4))
+    first = replace(first, points={**first.points, "W0": np.full(8, 5.0)})
+    data = [first, replace(other, name="other")]
+    options = {"material": pmma, "bare": True, "starts": 0, "check_stiffness": False}
+    laws = [
+        fit(data, "elasto-plastic", (), fixed={"eps_ratio": ratio}, **options)
+        for ratio in (0.48, 0.5)
+    ]
+    assert "tell them apart best" in what_would_tell(*laws)
+    series = bands_of(laws[0], laws[0].objective.terms[0], None)
+    assert [one.label for one in series] == ["10 µm/s, W0 = 5", "10 µm/s, W0 = 7"]
+
+
 def test_a_second_state_counts_in_the_slope_of_steady_friction():
     law, zero = get_law("two-state"), (0.0, 0.0)
     numbers = {"A": 0.012, "B": 0.01, "B2": 0.008}

@@ -584,8 +584,8 @@ def what_would_tell(first: Fit, second: Fit) -> str:
         trial = LockInTable(table.name, points, table.values, typical)
         weights, residuals = weights_of(trial), []
         for f in (first, second):
-            constants = {n: v for n, v in points.items() if n not in f.values}
-            term = LockInTerm(trial, f.objective.law, {**f.objective.fixed, **constants}, **motion)
+            constants = {**f.objective.fixed, name: points[name]}
+            term = LockInTerm(trial, f.objective.law, constants, **motion)
             prediction, _, outcome = term.predicted(f.values)
             if (outcome == Outcome.CONVERGED).all():
                 residuals.append(residuals_of(weights, prediction, {}))
