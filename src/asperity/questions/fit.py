@@ -73,6 +73,8 @@ class NormalPrior(Record):
             rule = "be VALUE+-DEVIATION UNIT"
             raise InputError("", rule, f"'{value}'", "write it like 0.2+-0.01 N/um")
         mean, std, unit = match.groups()
+        advice = "write the deviation like the value, as in 0.6+-0.03"
+        require("%" not in unit, "", "be without per cent", f"'{value}'", advice)
         return {"mean": f"{mean} {unit}".strip(), "std": f"{std} {unit}".strip()}
 
 

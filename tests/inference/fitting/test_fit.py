@@ -394,6 +394,15 @@ def test_a_second_state_counts_in_the_slope_of_steady_friction():
     assert any(line.name == "A - B - B2" for line in result.summary()[1])
 
 
+@pytest.mark.parametrize("text", ["A=0.013+-10%", "K=0.2+-5 % N/um"])
+def test_a_deviation_in_per_cent_is_refused(text):
+    """Its unit is that of the value: 0.013 % is another value."""
+    with pytest.raises(
+        InputError, match=r"must be without per cent, got '.*'; write the deviation"
+    ):
+        Fit(data=[{"file": "a.csv"}], prior=text)
+
+
 def test_as_many_parameters_as_data_are_refused_except_one_of_one(pmma):
     columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mean_friction": 0.45, "mu1": 1e-2}
     columns |= {"mean_friction_err": 1e-3, "mu1_err": 1e-5}
