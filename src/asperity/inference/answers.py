@@ -370,7 +370,7 @@ def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, 
             ready = {name: p for name, p in prior.items() if isinstance(p, Prior)}
             texts = {name: p for name, p in prior.items() if name not in ready}
         question = _Priors(prior=texts)  # type: ignore[arg-type]
-        options["prior"] = ready | priors_of(question.prior, free)
+        options["prior"] = priors_of(question.prior, free) | ready
     return options
 
 

@@ -394,6 +394,15 @@ def test_a_second_state_counts_in_the_slope_of_steady_friction():
     assert any(line.name == "A - B - B2" for line in result.summary()[1])
 
 
+@pytest.mark.parametrize(
+    "texts", [("A=0.01+-0.001", "bureau2000"), ("bureau2000", "A=0.01+-0.001")]
+)
+def test_a_prior_by_name_takes_precedence_over_a_material(texts):
+    """In any order."""
+    priors = priors_of(Fit(data=[{"file": "a.csv"}], prior=texts).prior, ["A", "D0"])
+    assert (priors["A"].mean, priors["D0"].mean) == (0.01, 4e-7)
+
+
 @pytest.mark.parametrize("text", ["A=0.013+-10%", "K=0.2+-5 % N/um"])
 def test_a_deviation_in_per_cent_is_refused(text):
     """Its unit is that of the value: 0.013 % is another value."""

@@ -340,7 +340,7 @@ def require_enough(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
 def priors_of(
     given: Mapping[str, NormalPrior | None], free: Sequence[str] | None
 ) -> dict[str, Prior]:
-    """Priors by the names of parameters, in SI.
+    """Priors by the names of parameters, in SI; those by name take precedence over a material.
 
     Parameters
     ----------
@@ -355,6 +355,7 @@ def priors_of(
         If a name is no parameter, a value has another unit, or a deviation is not positive.
     """
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO, GAIN: PARAMETER}
+    of_materials: dict[str, Prior] = {}
     result: dict[str, Prior] = {}
     for name, prior in given.items():
         if prior is None:
@@ -368,7 +369,7 @@ def priors_of(
                 raise
             except InputError as error:
                 raise error.about("prior") from None
-            result |= material_priors(material, free)
+            of_materials |= material_priors(material, free)
             continue
         parameter = known.get(name.partition("[")[0])
         if parameter is None:
@@ -380,7 +381,7 @@ def priors_of(
         got = f"{sd:g}" if unit == other else f"{unit} and {other}"
         require(sd > 0 and unit == other, label, rule, got, "give one")
         result[name] = Prior(mean, sd, "given", unit)
-    return result
+    return of_materials | result
 
 
 def _of_some_kind(parameter: Parameter, value: float | str, label: str) -> tuple[float, str]:
