@@ -58,6 +58,13 @@ def test_a_prior_of_the_stiffness_may_be_over_the_load():
     assert (prior.mean, prior.sd) == pytest.approx((2.1e5, 7e3))
 
 
+def test_a_prior_of_a_file_carries_its_unit():
+    """0.7 m is no length of this plan."""
+    plan = changed(prior={"lambda": {"mean": 0.7, "std": 0.1}})
+    with pytest.raises(InputError, match=r"prior.*lambda.* must carry a unit, got 0.7"):
+        plan_of(plan, require_unit=True)
+
+
 def test_a_number_that_only_the_rival_has_may_be_given():
     fixed = {"c": 2.0}
     rivals = {"measure": None, "rival": "nagata"}

@@ -37,6 +37,7 @@ from asperity.parameters import (
     suggestion,
 )
 from asperity.questions.fit import NormalPrior
+from asperity.questions.record import require_unit
 from asperity.units import KINDS, format_si, to_si
 
 #: Parameters of laws that have no influence under a constant load.
@@ -386,6 +387,7 @@ def priors_of(
 
 def _of_some_kind(parameter: Parameter, value: float | str, label: str) -> tuple[float, str]:
     """SI value and SI unit; K may be a force, a stress or a pure number over a length."""
+    require_unit(value, parameter.kind, label)
     others = ["stress_per_length", "per_length"] if parameter.name == "K" else []
     if isinstance(value, str):
         for kind in others:
