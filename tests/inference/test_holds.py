@@ -1,11 +1,20 @@
 """Tables of holds as data: A, B and D0 that an independent integration was made with come back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.inference import compare, fit, healing_table, read_healing, sample_posterior
-from asperity.inference.holds import HoldTerm
+from asperity.inference import (
+    Prior,
+    compare,
+    fit,
+    healing_table,
+    read_healing,
+    sample_posterior,
+)
+from asperity.inference.holds import HoldTerm, joined_holds
 from asperity.laws import RiceRuina
 from references.memory_tests import Interface
 
@@ -163,6 +172,16 @@ def test_what_holds_cannot_say_is_refused(exact):
     few = healing_table({"hold_time": [1, 10], "healing": [0.1, 0.2], "V": 1e-6, "K": 1e3})
     with pytest.raises(InputError, match="more data than free parameters"):
         fit(few, "rice-ruina", ["A", "B", "D0"])
+
+
+def test_rows_keep_their_names(exact):
+    """Those of a second table, and those after one that is left out."""
+    first = table(exact, exact[1])
+    joined = joined_holds([first, replace(first, name="others", row_names=np.array([]))])
+    kept = joined.without(np.arange(joined.rows) == 3)
+    assert [kept.row_names[i] for i in (2, 3, 9)] == [
+        "row 3 of holds", "row 5 of holds", "row 1 of others"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

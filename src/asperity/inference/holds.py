@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,8 @@ _KINDS = {
     "W0": ("force", "positive"),
 }
 _REQUIRED = ("hold_time", HEALING, "V", "K")
+#: Fields of a table that always have a value in each row.
+_COLUMNS = (*_REQUIRED, "row_names")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,8 @@ class HealingTable:
         Velocity of the drive before and after the hold (m/s).
     K : array
         Stiffness of the spring over the normal load (1/m).
+    row_names : array of str, shape (rows,)
+        Names of the rows in messages, such as "row 3 of" the table; by default counted from 1.
     """
 
     name: str
@@ -70,20 +74,21 @@ class HealingTable:
     errors: Float | None
     V: Float
     K: Float
+    row_names: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=str))
+
+    def __post_init__(self) -> None:
+        if self.row_names.size == 0:
+            names = np.array([f"row {i} of {self.name}" for i in range(1, self.rows + 1)])
+            object.__setattr__(self, "row_names", names)
 
     @property
     def rows(self) -> int:
         """Number of holds."""
         return self.healing.size
 
-    @property
-    def row_names(self) -> NDArray[np.str_]:
-        """Names of the rows in messages."""
-        return np.array([f"row {i} of {self.name}" for i in range(1, self.rows + 1)])
-
     def without(self, rows: Bool) -> HealingTable:
         """The table without some of its rows."""
-        names = ["hold_time", "healing", "V", "K", *(["errors"] if self.errors is not None else [])]
+        names = [*_COLUMNS, *(["errors"] if self.errors is not None else [])]
         return replace(self, **{n: getattr(self, n)[~rows] for n in names})
 
 
@@ -168,7 +173,7 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
         rule = "be given for all tables of holds or for none"
         advice = "one error is estimated for all rows that have none"
         raise InputError("healing_err", rule, f"it for {sum(known)} of {len(known)}", advice)
-    names = ["hold_time", "healing", "V", "K", *(["errors"] if all(known) else [])]
+    names = [*_COLUMNS, *(["errors"] if all(known) else [])]
     columns: dict[str, Any] = {n: np.concatenate([getattr(t, n) for t in tables]) for n in names}
     return HealingTable(", ".join(t.name for t in tables), **{"errors": None, **columns})
 
