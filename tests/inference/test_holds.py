@@ -174,6 +174,18 @@ def test_what_holds_cannot_say_is_refused(exact):
         fit(few, "rice-ruina", ["A", "B", "D0"])
 
 
+def test_without_residuals_no_error_is_estimated():
+    """One hold for one parameter, and two holds for two parameters with priors."""
+    one = healing_table({"hold_time": 100.0, "healing": 0.05, "V": 1e-6, "K": 2e4})
+    fixed = {"A": 0.01, "D0": 1e-6}
+    with pytest.raises(InputError, match="healing_err, or more holds than free parameters"):
+        fit(one, "rice-ruina", ["B"], fixed=fixed)
+    two = healing_table({"hold_time": [10, 100], "healing": [0.03, 0.05], "V": 1e-6, "K": 2e4})
+    priors = {"A": Prior(0.01, 0.002, ""), "B": Prior(0.015, 0.003, "")}
+    with pytest.raises(InputError, match="got 2 for 2; no residuals are left"):
+        fit(two, "rice-ruina", ["A", "B"], fixed={"D0": 1e-6}, prior=priors)
+
+
 def test_rows_keep_their_names(exact):
     """Those of a second table, and those after one that is left out."""
     first = table(exact, exact[1])

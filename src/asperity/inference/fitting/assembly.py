@@ -48,6 +48,7 @@ from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import (
     Prior,
+    UnfittableLawError,
     material_priors,
     material_values,
     require_free_names,
@@ -157,6 +158,10 @@ def _of_holds(law: type[Law], table: HealingTable, free: list[str], given: Given
     unknowns = unknowns_of(law, free, start=begun, priors=priors)
     require_free_names(unknowns, given.start, priors)
     require_enough(table.name, table.rows, unknowns)
+    if table.errors is None and table.rows <= len(unknowns):
+        rule = "have healing_err, or more holds than free parameters"
+        got, advice = f"{table.rows} for {len(unknowns)}", "no residuals are left to estimate it by"
+        raise UnfittableLawError(table.name, rule, got, advice)
     term = HoldTerm(table, law, constants)
     return Objective((term,), law, unknowns, constants, tolerance=1e-9)
 
