@@ -84,6 +84,22 @@ def test_impossible_covariances_are_refused():
         table_of(columns)
 
 
+@pytest.mark.parametrize(
+    ("name", "other", "quantity"),
+    [
+        ("frequency", "f", "frequency"),
+        ("epsilon_err", "epsilon_uncertainty", "epsilon_err"),
+        ("mu1_phase1_cov", "phase1_mu1_cov", "the covariance of mu1 and phase1"),
+        ("mu1_err", "mu1_uncertainty", "mu1_err"),
+    ],
+)
+def test_two_columns_of_one_quantity_are_refused(name, other, quantity):
+    columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mu1": 1e-3, "mu1_err": 1e-5}
+    columns |= {"phase1": 0.1, "phase1_err": 0.01, name: columns.get(name, 1e-9), other: 2e-9}
+    with pytest.raises(InputError, match=f"one column for {quantity}, got '{other}' as a second"):
+        table_of(columns)
+
+
 def mean_and_drop(rng, *, copied):
     velocity = np.repeat([1e-6, 3e-6, 1e-5], 4)
     epsilon = np.tile([0.1, 0.2, 0.3, 0.4], 3)

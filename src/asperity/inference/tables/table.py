@@ -383,10 +383,13 @@ def table_of(
             zero = np.nan_to_num(column) == 0
             _require(zero, name, key, column, rule, "leave those rows out")
         elif parameter is not None:
+            _require_one_column(name, parameter, key, parameter in points)
             advice = "fill the cell in or leave the row out"
             _require(np.isfinite(column), name, parameter, column, "be a finite number", advice)
             points[parameter] = np.asarray(known[parameter].check(column, f"{name}.{parameter}"))
         elif key in _PAIRS:
+            pair = " and ".join(_PAIRS[key])
+            _require_one_column(name, f"the covariance of {pair}", key, _PAIRS[key] in covariances)
             covariances[_PAIRS[key]] = column
         elif key.endswith("_cov") and key.startswith(OBSERVABLES):
             raise InputError(
@@ -394,17 +397,14 @@ def table_of(
                 f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
             )
         elif key in _OF_EPSILON:
+            _require_one_column(name, "epsilon_err", key, "epsilon" in of_epsilon)
             # Without a column or cell, epsilon is exact.
             spread = np.nan_to_num(column)
             good = np.isfinite(spread) & (spread >= 0)
             _require(good, name, key, column, "be finite and not negative", "correct it")
             of_epsilon["epsilon"] = spread
         elif (plain := _observable_of(key)) is not None:
-            if plain in observed:
-                raise InputError(
-                    f"{name} must have one column for {plain}, got '{key}' as a second one; remove "
-                    "one of them"
-                )
+            _require_one_column(name, plain, key, plain in observed)
             observed[plain] = column
     missing = [p for p in _OPERATING if p not in points]
     if missing:
@@ -422,6 +422,12 @@ def table_of(
     _refuse_copies(table, table, "{0} must have each reading once, got {2} equal to {1}")
     _refuse_impossible(table)
     return _without_copies(table)
+
+
+def _require_one_column(table: str, quantity: str, key: str, known: bool) -> None:
+    """Refuse a second column of a quantity."""
+    rule, got = f"have one column for {quantity}", f"'{key}' as a second one"
+    require(not known, table, rule, got, "remove one of them")
 
 
 def in_all_rows(column: Float, rows: int, label: str) -> Float:
