@@ -111,12 +111,12 @@ def material_text(fit: Fit) -> str:
     ]
     for name in (*law_parameters(fit.objective.law), "K", "W0", "M"):
         estimate = fit.parameters.get(name)
-        fixed = np.unique(fit.objective.fixed.get(name, np.nan))
+        fixed, unit = fit.fixed_numbers.get(name, (np.array([np.nan]), ""))
         if estimate is None and (fixed.size != 1 or not np.isfinite(fixed[0])):
             continue
         value = estimate.value if estimate else float(fixed[0])
         parameter = known[name]
-        if estimate and estimate.unit != parameter.unit:
+        if (estimate.unit if estimate else unit) != parameter.unit:
             continue  # the stiffness of a recording under a stress, or over the load
         lines += [
             "",
@@ -196,8 +196,8 @@ def _recording(term: RunTerm) -> str:
 def provenance(fit: Fit) -> str:
     """Fixed parameters, date, version of the program, and source of the law."""
     fixed = [
-        (symbol(n), f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
-        for n, v in fit.objective.fixed.items()
+        (symbol(n), f"{v[0]:.6g}" + ("" if v.size == 1 else f" to {v[-1]:.6g}"), unit)
+        for n, (v, unit) in fit.fixed_numbers.items()
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sources = "".join(
@@ -206,7 +206,7 @@ def provenance(fit: Fit) -> str:
     data = ", ".join(term.name for term in fit.objective.terms)
     return (
         f"<p>asperity {__version__}, {made}; data: {escape(data)}; numbers that were fixed, in "
-        f"SI:</p>{html_table(('', 'value'), fixed)}<p>The law:</p>{sources}"
+        f"SI:</p>{html_table(('', 'value', ''), fixed)}<p>The law:</p>{sources}"
     )
 
 

@@ -10,6 +10,7 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of, trace_o
 from scipy.signal import lfilter
 
 from asperity.errors import InputError, worded
+from asperity.fit_report.folder import material_text, provenance
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
@@ -17,7 +18,7 @@ from asperity.inference.fitting.plausibility import (
     contradicted_stiffness,
     unusual_numbers,
 )
-from asperity.inference.fitting.result import Optimum
+from asperity.inference.fitting.result import Optimum, fit_record
 from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, without_spikes
@@ -410,6 +411,10 @@ def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():
     assert "D0" in warning
     # Without an improvement of AICc nothing is contradicted.
     assert contradicted_stiffness(result, result, [run], 2 * TRUE["K"]) == []
+    # It is among the fixed numbers, in the unit of the recording.
+    assert fit_record(result)["fixed"]["K"] == {"value": 2 * TRUE["K"], "unit": "Pa/m"}
+    assert f"<td>K</td><td>{2 * TRUE['K']:.6g}</td><td>Pa/m</td>" in provenance(result)
+    assert "numbers.K" not in material_text(result)
 
 
 def test_a_shared_stiffness_that_the_recordings_contradict_is_named(monkeypatch):

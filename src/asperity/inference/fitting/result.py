@@ -320,6 +320,21 @@ class Fit(Warned, Drawn):
         return result
 
     @property
+    def fixed_numbers(self) -> dict[str, tuple[Float, str]]:
+        """Values of the fixed parameters, each once and rising, and their unit; in SI, by name.
+
+        The fixed stiffness of a recording is K or K[run], as among `parameters`.
+        """
+        known = {**point_parameters(self.objective.law), EPS_RATIO.name: EPS_RATIO}
+        result = {n: (np.unique(v), known[n].unit) for n, v in self.objective.fixed.items()}
+        several = len(self.objective.terms) > 1
+        for term in self.objective.terms_of(RunTerm):
+            if "K" in term.fixed:
+                name = f"K[{term.name}]" if several else "K"
+                result[name] = np.array([term.fixed["K"]]), term.run.stiffness_unit
+        return result
+
+    @property
     def coordinate_errors(self) -> Float:
         """Standard errors of the coordinates of the fit, shape (n,), at most 1.
 
@@ -367,18 +382,16 @@ def fit_record(fit: Fit) -> dict[str, Any]:
     """The result of a fit for JSON; infinite and undefined numbers are None."""
     names = ("law", "converged", "message", "undetermined", "warnings")
     numbers = ("chi2", "dof", "p_value", "log_likelihood", "aicc", "bic")
-    known = {**point_parameters(fit.objective.law), EPS_RATIO.name: EPS_RATIO}
-    # A number that differs between the rows of a table is None.
-    fixed = {n: np.unique(v) for n, v in fit.objective.fixed.items()}
     record = {name: getattr(fit, name) for name in (*names, *numbers)} | {
         "parameters": {
             name: {**_estimate(p), "determined": name not in fit.undetermined}
             for name, p in fit.parameters.items()
         },
         "over_load": {name: _estimate(p) for name, p in fit.over_load.items()},
+        # A number that differs between the rows of a table is None.
         "fixed": {
-            name: {"value": v[0] if v.size == 1 else None, "unit": known[name].unit}
-            for name, v in fixed.items()
+            name: {"value": v[0] if v.size == 1 else None, "unit": unit}
+            for name, (v, unit) in fit.fixed_numbers.items()
         },
         "correlation": {"names": list(fit.parameters), "matrix": fit.correlation.tolist()},
         "observables": {
