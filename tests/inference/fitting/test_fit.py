@@ -9,7 +9,7 @@ from scipy.stats import chi2
 import asperity as asp
 from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
-from asperity.inference import Prior, compare, fit, table_of
+from asperity.inference import Prior, compare, fit, shift_of_estimates, table_of
 from asperity.inference.answers import answer_fit
 from asperity.inference.comparison.compare import what_would_tell
 from asperity.inference.fitting.inputs import fixed_values, free_by_default, priors_of
@@ -375,6 +375,18 @@ def test_predictions_of_two_tables_take_the_load_of_their_rows(readings, pmma):
     assert "tell them apart best" in what_would_tell(*laws)
     series = bands_of(laws[0], laws[0].objective.terms[0], None)
     assert [one.label for one in series] == ["10 µm/s, W0 = 5", "10 µm/s, W0 = 7"]
+
+
+def test_a_prior_holds_an_estimate_against_other_fixed_numbers(readings, pmma):
+    """As precise as the data it halves the shift, to the first order."""
+    table, options = readings(3), {"material": pmma, "starts": 1, "check_stiffness": False}
+    free = fit(table, "elasto-plastic", ("eps_ratio",), **options)
+    estimate = free.parameters["eps_ratio"]
+    prior = {"eps_ratio": Prior(estimate.value, estimate.se, "")}
+    held = fit(table, "elasto-plastic", ("eps_ratio",), prior=prior, **options)
+    ends = {"lambda": 7.1e-7}, {"lambda": 6.9e-7}
+    shifts = [shift_of_estimates(result, *ends)["eps_ratio"] for result in (free, held)]
+    assert shifts[1] == pytest.approx(shifts[0] / 2, rel=0.01)
 
 
 def test_a_second_state_counts_in_the_slope_of_steady_friction():

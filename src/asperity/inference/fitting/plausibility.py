@@ -207,8 +207,12 @@ def shift_of_estimates(
         if residuals is None:
             return dict.fromkeys(fit.values, math.inf)
         sides.append(residuals)
-    jacobian = (sides[0].jacobian + sides[1].jacobian) / 2
-    change_of_residuals = (sides[0].values - sides[1].values) / 2
+    # Priors do not change with the fixed numbers, and hold the estimates.
+    objective = fit.objective
+    priors = objective.prior_residuals(objective.coordinates(fit.values))[1]
+    slopes = np.array([k.slope(fit.values[k.name]) for k in objective.unknowns])
+    jacobian = np.vstack([(sides[0].jacobian + sides[1].jacobian) / 2, priors / slopes])
+    change_of_residuals = np.append((sides[0].values - sides[1].values) / 2, np.zeros(len(priors)))
     scale = np.sqrt((jacobian**2).sum(0))
     moved = np.linalg.lstsq(jacobian / scale, -change_of_residuals, rcond=None)[0] / scale
     return dict(zip(fit.values, map(float, moved), strict=True))
