@@ -14,6 +14,7 @@ from asperity.laws import Law, registered
 from asperity.materials import Material, Number
 from asperity.parameters import Parameter, all_parameters, point_parameters, suggestion
 from asperity.parameters.arguments import number, typed
+from asperity.units import KINDS
 
 #: Share of the applied modulation that the contacts carry; only fits have this parameter.
 EPS_RATIO = Parameter(
@@ -337,11 +338,11 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
     InputError
         If the material has no number with an uncertainty for any of the names.
     """
-    priors = {
-        name: Prior(published.si, float(published.si_uncertainty or 0), material.name)
-        for name, published in _published(material, names).items()
-        if published.uncertainty
-    }
+    priors = {}
+    for name, published in _published(material, names).items():
+        if published.uncertainty:
+            sd, unit = float(published.si_uncertainty or 0), KINDS[published.dimension].si
+            priors[name] = Prior(published.si, sd, material.name, unit)
     got, advice = f"'{material.name}', which has none for {symbols(names)}", "leave the prior out"
     require(priors, "prior", "be a material with uncertainties of free parameters", got, advice)
     return priors

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of, trace_of
 from scipy.signal import lfilter
 
+from asperity import materials
 from asperity.errors import InputError, worded
 from asperity.fit_report.folder import material_text, provenance
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
@@ -401,6 +402,17 @@ def test_values_outside_those_of_contacts_are_named(steps_fit):
     changed = replace(steps_fit, parameters={**steps_fit.parameters, "D0": unusual})
     (warning,) = unusual_numbers(changed, [run])
     assert worded(warning).startswith("D0 of 0.006 m is outside")
+
+
+def test_a_published_stiffness_has_its_unit_for_recordings_under_a_stress(tmp_path):
+    """0.2 N/um is no 0.2 MPa/m."""
+    (run,), file = runs_of(CASE, 1), tmp_path / "rig.toml"
+    file.write_text(
+        "title = 'rig'\n[numbers.K]\nvalue = 0.2\nuncertainty = 0.01\nunit = 'N/um'\n"
+        "dimension = 'stiffness'\nkind = 'published'\nplace = 'II'\n"
+    )
+    with pytest.raises(InputError, match=r"prior\['K'\] must be in Pa/m or 1/m for run, got N/m"):
+        fit(run, "rice-ruina", [*FREE, "K"], prior=materials.load(file))
 
 
 def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():
