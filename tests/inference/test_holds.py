@@ -14,8 +14,10 @@ from asperity.inference import (
     read_healing,
     sample_posterior,
 )
+from asperity.inference.answers import read_data
 from asperity.inference.holds import HoldTerm, joined_holds
 from asperity.laws import RiceRuina
+from asperity.questions.fit import Fit
 from references.memory_tests import Interface
 
 A, B, D0 = 0.011, 0.014, 4e-6
@@ -184,6 +186,14 @@ def test_without_residuals_no_error_is_estimated():
     priors = {"A": Prior(0.01, 0.002, ""), "B": Prior(0.015, 0.003, "")}
     with pytest.raises(InputError, match="got 2 for 2; no residuals are left"):
         fit(two, "rice-ruina", ["A", "B"], fixed={"D0": 1e-6}, prior=priors)
+
+
+def test_a_table_has_the_name_of_the_question(tmp_path):
+    """As tables of readings and recordings."""
+    file = tmp_path / "a.csv"
+    file.write_text("hold_time,healing,V,K\n10,0.01,1e-6,2e4\n100,0.02,1e-6,2e4\n")
+    (data,) = read_data(Fit(data=[{"file": file, "name": "dry granite"}]))
+    assert data.row_names[1] == "row 2 of dry granite"
 
 
 def test_rows_keep_their_names(exact):

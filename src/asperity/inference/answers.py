@@ -155,7 +155,7 @@ def read_data(
             field = Argument(name, next(iter(value))) if keyed else f"read.{name}"
             raise InputError(field, rule, "a table", "leave it out, or correct the table")
         if kind == "holds":
-            result.append(read_healing(data.file, held))
+            result.append(read_healing(data.file, held, name=data.name))
         elif kind == "readings":
             result.append(read_table(data.file, at, name=data.name))
         else:

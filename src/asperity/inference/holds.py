@@ -93,7 +93,9 @@ class HealingTable:
 
 
 @typed
-def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> HealingTable:
+def read_healing(
+    path: str | Path, given: Mapping[str, Any] | None = None, *, name: str = ""
+) -> HealingTable:
     """Read a CSV of holds.
 
     Parameters
@@ -105,6 +107,8 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
         columns, are skipped.
     given : mapping of str to number or str, optional
         Values of V, K and W0 if they are the same in all rows.
+    name : str
+        Name of the table in messages; by default that of the file.
 
     Raises
     ------
@@ -113,11 +117,11 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
     """
     path = Path(path)
     columns = read_headed_columns(path, _KINDS, row="a hold")
-    for name in given or {}:
-        field, got = Argument("fixed", name), "a column of the data too"
+    for number in given or {}:
+        field, got = Argument("fixed", number), "a column of the data too"
         advice = "leave it out, or remove the column"
-        require(name not in columns, field, "be given once", got, advice)
-    return healing_table({**(given or {}), **columns}, name=path.name)
+        require(number not in columns, field, "be given once", got, advice)
+    return healing_table({**(given or {}), **columns}, name=name or path.name)
 
 
 @typed
