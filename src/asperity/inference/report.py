@@ -71,7 +71,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
     # Fits of holds and of cycles take friction relative to a level: their mu0 is assumed.
-    assumed = fit.parts(HoldTerm) or fit.parts(CycleTerm)
+    assumed = bool(fit.parts(HoldTerm)) or bool(fit.parts(CycleTerm))
     if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not assumed:
         sentences.append(f"mu0 = {mu0[0]:.4g} at V0 = {quantity_text(V0[0], 'm/s')}")
     if fit.undetermined:
