@@ -131,6 +131,15 @@ def test_the_order_of_day_and_month_with_the_shorter_recording_is_taken(written)
     assert trace.time[-1] == pytest.approx(86400 + TIME[-1], abs=1e-6)
 
 
+def test_a_recording_across_the_midnight_of_a_twelfth_day_has_all_its_times(written):
+    # Half of it would be on 1 December, and the other half on no day.
+    stamps = ["12/01/2024 23:59:58", "12/01/2024 23:59:59", "13/01/2024 00:00:00"]
+    rows = [f"{stamp},{10 + k},{5 + k}\n" for k, stamp in enumerate(stamps)]
+    trace = read(written("Time,Load (N),Shear (N)\n" + "".join(rows)))
+    assert trace.time.tolist() == [0, 1, 2]
+    assert trace.provenance["time"].endswith("2024-01-12 23:59:58")
+
+
 @pytest.mark.parametrize("part", [0.01, 0.6])
 def test_gzip_that_is_cut_is_refused(written, part):
     packed = gzip.compress(PLAIN.encode())

@@ -143,7 +143,7 @@ def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
 
     Formats are ISO 8601, dates with the day before or after the month, minutes:seconds, and
     hours:minutes:seconds, also across midnight. If day and month can be exchanged, the order that
-    makes the recording shorter is used.
+    fits more of the stamps is used, and of equal ones that which makes the recording shorter.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
 
 
 def _by_order(texts: pd.Series[str]) -> pd.Series[Any] | None:
-    """Stamps by the order of day and month that makes the recording shortest."""
+    """Stamps by the order of day and month that fits most of them, in the shortest recording."""
     import pandas as pd
 
     first = texts[texts.first_valid_index()] if texts.notna().any() else ""
@@ -186,9 +186,10 @@ def _by_order(texts: pd.Series[str]) -> pd.Series[Any] | None:
             if pd.isna(pd.to_datetime(first, errors="coerce", format=form)):
                 continue
             stamps = pd.to_datetime(texts, errors="coerce", format=form)
-            length = stamps.max() - stamps.min()
-            if best is None or length < best[0]:
-                best = (length, stamps)
+            # An order that does not fit has no times after the twelfth day of a month.
+            rank = (-stamps.count(), stamps.max() - stamps.min())
+            if best is None or rank < best[0]:
+                best = (rank, stamps)
     return best[1] if best else None
 
 
