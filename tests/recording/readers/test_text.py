@@ -186,6 +186,17 @@ def test_missing_cells_and_words_among_numbers_are_named(written, planted):
     assert np.array_equal(np.flatnonzero(np.isnan(trace.channel("W").values)), [7, 9, 11])
 
 
+@pytest.mark.parametrize("cell", ["overload", "(600.0)", "1 001.68"])
+def test_words_in_the_first_rows_are_missing_values(written, planted, cell):
+    lines = table(planted).splitlines()
+    lines[0] = f"0.000000,{cell},2.8"
+    lines[1] = f"0.001000,{cell},2.8"
+    trace = read(written("time_s,W_N,F_N\n" + "\n".join(lines) + "\n"))
+    assert names(trace) == ["text in numbers", "missing values"]
+    assert np.array_equal(trace.time, planted.time)
+    assert np.array_equal(np.flatnonzero(np.isnan(trace.channel("W").values)), [0, 1])
+
+
 @pytest.mark.parametrize(
     ("row", "expected"),
     [

@@ -423,6 +423,9 @@ def layout_of(
     rows = [row for row in rows if len(row) == width]
     closed = width > 1 and separators[0] is not None and not any(row[-1] for row in rows)
     first = next(i for i, line in enumerate(lines) if _is_row(line, *separators, width, rows))
+    # Words among the numbers of the first rows are missing values, as in later rows.
+    while first and _has_words_among_numbers(lines[first - 1], *separators, width, rows):
+        first -= 1
     above = lines[:first]
     counted = _count_rows([row[0] for row in rows])
     heads = _headings(above, separators[0], width - closed, counted)
@@ -494,8 +497,29 @@ def _is_row(
     numbers = any(is_number(cell, decimal) for cell in cells)
     if len(cells) != width or not (numbers or all(c and c in MISSING for c in cells)):
         return False
+    return all(_is_value(cell, decimal) for cell in _usually_numbers(cells, decimal, rows))
+
+
+def _has_words_among_numbers(
+    line: TextLine, delimiter: str | None, decimal: str, width: int, rows: Sequence[Sequence[str]]
+) -> bool:
+    """Whether a line above the first row is one too, with words in some columns of numbers.
+
+    The first of these columns has a number there, as has at least half of them; no word is a unit.
+    """
+    cells = cells_of(line.text, delimiter)
+    if line.blank or line.comment or len(cells) != width:
+        return False
+    cells = _usually_numbers(cells, decimal, rows)
+    others = [cell for cell in cells if not is_number(cell, decimal)]
+    begins = bool(cells) and is_number(cells[0], decimal) and 2 * len(others) <= len(cells)
+    return begins and not any(map(usual, others))
+
+
+def _usually_numbers(
+    cells: Sequence[str], decimal: str, rows: Sequence[Sequence[str]]
+) -> list[str]:
+    """Cells of a line in the columns in which most of the sampled rows have numbers."""
     columns = zip(*rows, strict=True)
     usual = [sum(is_number(c, decimal) for c in column) * 2 > len(rows) for column in columns]
-    return all(
-        _is_value(cell, decimal) for cell, is_usual in zip(cells, usual, strict=True) if is_usual
-    )
+    return [cell for cell, is_usual in zip(cells, usual, strict=True) if is_usual]
