@@ -171,15 +171,18 @@ def test_intervals_that_differ_are_not_chosen_from(tmp_path, planted, write):
     assert "several clocks" in {f.name for f in trace.findings}
 
 
-def test_waveforms_that_begin_at_different_times_have_no_common_clock(tmp_path, planted):
+@pytest.mark.parametrize("by_date", [False, True])
+def test_waveforms_that_begin_at_different_times_have_no_common_clock(tmp_path, planted, by_date):
     path = tmp_path / "a.tdms"
+    noon = np.datetime64("2024-05-17T12:00:00")
     with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                nptdms.ChannelObject("run", n, v, {"wf_increment": 1e-3, "wf_start_offset": start})
-                for n, v, start in (("W", planted.W, 0.0), ("F", planted.F, 0.5))
-            ]
-        )
+        channels = []
+        for name, values, ms in (("W", planted.W, 0), ("F", planted.F, 500)):
+            begins = noon + np.timedelta64(ms * by_date, "ms")
+            clock = {"wf_start_offset": 0.0 if by_date else ms / 1000, "wf_start_time": begins}
+            about = {"wf_increment": 1e-3, **clock}
+            channels.append(nptdms.ChannelObject("run", name, values, about))
+        writer.write_segment(channels)
     with pytest.raises(InputError, match=r"from 0 s on and 0\.001 s from 0\.5 s on"):
         read(path)
 

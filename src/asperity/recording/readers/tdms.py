@@ -46,7 +46,11 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     nptdms = library("recording", "be in a format that can be read here", path)
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
-        groups = {group.name: _group(group.channels()) for group in file.groups()}
+        members = {member.name: member.channels() for member in file.groups()}
+        wanted = (group or "").strip("/")
+        read_channels = members.get(wanted) or [c for every in members.values() for c in every]
+        begin = min((t for c in read_channels if (t := _begin(c)) is not None), default=None)
+        groups = {name: _group(channels, begin) for name, channels in members.items()}
     if not any(columns for columns, _ in groups.values()):
         raise unusable(path, "which is cut before its first channel, or has none")
     findings: list[Finding] = []
@@ -79,8 +83,15 @@ def _quiet(nptdms: Any) -> Iterator[None]:
         manager.set_level(level)
 
 
-def _group(channels: list[Any]) -> Group:
-    """Columns of channels, and the clocks of those that are waveforms."""
+def _begin(channel: Any) -> np.datetime64 | None:
+    """Date and time to which the clock of a waveform refers; None without."""
+    about = channel.properties
+    begin = about.get("wf_start_time") if "wf_increment" in about else None
+    return begin if isinstance(begin, np.datetime64) and not np.isnat(begin) else None
+
+
+def _group(channels: list[Any], begin: np.datetime64 | None) -> Group:
+    """Columns of channels, and the clocks of those that are waveforms, in seconds since `begin`."""
     columns, clocks = [], []
     for channel in channels:
         about = channel.properties
@@ -89,7 +100,10 @@ def _group(channels: list[Any]) -> Group:
         columns.append(RawColumn(channel.name, values, unit))
         step = interval_of({"dt": about.get("wf_increment")})
         if step is not None:
-            clocks.append(Stated(float(about.get("wf_start_offset", 0.0)), step, values.size))
+            start = float(about.get("wf_start_offset", 0.0))
+            if begin is not None and (own := _begin(channel)) is not None:
+                start += float((own - begin) / np.timedelta64(1, "s"))
+            clocks.append(Stated(start, step, values.size))
     return Group(columns, clocks)
 
 
