@@ -107,6 +107,26 @@ def test_netcdf_is_read(tmp_path, planted):
     assert_planted(read(target), planted)
 
 
+def test_packed_netcdf_is_unpacked(tmp_path, planted):
+    """Whole numbers with a factor and an offset, a fill value, and times since a date."""
+    import xarray as xr
+
+    load = np.round(planted.W, 2)
+    load[7] = np.nan
+    channels = {n: ("time", v, {"units": "N"}) for n, v in (("load", load), ("shear", planted.F))}
+    dates = np.datetime64("2024-05-17T12:00:00") + (planted.time * 1e9).round().astype("m8[ns]")
+    path = tmp_path / "a.nc"
+    packed = {"dtype": "int16", "scale_factor": 0.01, "add_offset": 5.0, "_FillValue": -32768}
+    times = {"dtype": "float64", "units": "minutes since 2024-05-17 12:00:00"}
+    xr.Dataset(channels, {"time": dates}).to_netcdf(
+        path, engine="h5netcdf", encoding={"load": packed, "time": times}
+    )
+    trace = read(path)
+    assert [f.name for f in trace.findings] == ["missing values"]
+    assert np.allclose(trace.time, planted.time, rtol=0, atol=1e-9)
+    assert np.allclose(trace.channel("W").values, load, equal_nan=True)
+
+
 def test_recordings_of_different_length_must_be_chosen(tmp_path, planted):
     path = tmp_path / "two.h5"
     with h5py.File(path, "w") as file:

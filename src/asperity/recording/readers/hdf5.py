@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from asperity.errors import InputError
 from asperity.recording.readers.raw import (
     Group,
     RawRecording,
+    as_texts,
     beginning,
     group_of,
     one_recording,
@@ -21,6 +23,9 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 #: Attribute of the datasets of a group that are its recording; without one, all are.
 _ROLE = "recording_role"
+#: Attributes of NetCDF: numbers that stand for a missing value, and how the others are packed.
+_FILLS = ("_FillValue", "missing_value")
+_PACKING = (*_FILLS, "scale_factor", "add_offset")
 #: Most values of a text that can be the unit of an array.
 _SHORT = 1000
 #: Bytes of an array that are always read, and bytes that a byte of a file can hold: DEFLATE packs
@@ -97,12 +102,32 @@ def _group(node: Any, path: Path, matlab: bool) -> Group:
             texts = {k: v for k, v in item.items() if _holds_values(v) and v.size < _SHORT}
             arrays[key] = {k: _value(v, path, matlab) for k, v in texts.items()}
         elif _holds_values(item):
-            arrays[key] = _value(item, path, matlab)
-            attributes[key] = dict(item.attrs)
+            attributes[key] = _without_origin(dict(item.attrs))
+            arrays[key] = _unpacked(_value(item, path, matlab), attributes[key])
     # A file of a computed motion marks what an instrument would have recorded of it.
     recorded = [key for key, about in attributes.items() if _ROLE in about]
     arrays = {key: arrays[key] for key in recorded} or arrays
     return group_of(arrays, attributes, dict(node.attrs))
+
+
+def _without_origin(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Attributes with the unit of times such as ``"minutes since 2024-05-17"`` of NetCDF alone."""
+    unit = (as_texts(attributes.get("units")) or [""])[0]
+    plain, since, _ = unit.partition(" since ")
+    return {**attributes, "units": plain} if since else attributes
+
+
+def _unpacked(values: Any, attributes: Mapping[str, Any]) -> Any:
+    """Numbers of a dataset that is packed as in NetCDF, NaN where it has the fill value."""
+    about = {key: np.ravel(attributes[key]) for key in _PACKING if key in attributes}
+    about = {key: number for key, number in about.items() if number.dtype.kind in "iuf"}
+    if not about or not isinstance(values, np.ndarray) or values.dtype.kind not in "iuf":
+        return values
+    missing = np.isin(values, np.concatenate([about.pop(key, np.empty(0)) for key in _FILLS]))
+    unpacked = values.astype(np.float64)
+    unpacked = unpacked * about.get("scale_factor", 1.0) + about.get("add_offset", 0.0)
+    unpacked[missing] = np.nan
+    return unpacked
 
 
 def _holds_values(item: Any) -> bool:
