@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.recording import Trace, read
+from asperity.recording import Channel, Trace, read
 from asperity.recording.writers import write
 from asperity.tribometer.sensors import DisplacementGauge, LoadCell, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer, channel_gain
@@ -131,6 +131,27 @@ def test_a_recording_comes_back_from_its_file(laboratory, tmp_path, suffix, digi
         np.testing.assert_allclose(channel.values, kept, rtol=0, atol=digits * np.abs(kept).max())
 
 
+@pytest.mark.parametrize("suffix", ["csv", "txt", "h5", "tdms"])
+def test_names_and_units_of_any_channel_come_back(tmp_path, suffix) -> None:
+    if suffix == "tdms":
+        pytest.importorskip("nptdms")
+    time = np.arange(50) / 10
+    channels = {
+        "Load, filtered": Channel(7 + time, "force", "N"),
+        "F/N": Channel(0.3 + time, "dimensionless"),
+        "Gauge": Channel(3 + time),
+    }
+    back = read(write(Trace(time, channels), tmp_path / f"a.{suffix}"))
+    assert [f.name for f in back.findings] == ["unknown unit"]
+    assert {c.kind: c.values[0] for c in back.channels.values()} == {
+        "force": 7,
+        "dimensionless": 0.3,
+        None: 3,
+    }
+    assert back.channels["Load, filtered"].kind == "force"
+    assert back.channels["Gauge"].kind is None
+
+
 def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
     pytest.importorskip("nptdms")
     time = laboratory.time.copy()
@@ -147,6 +168,10 @@ def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
         (lambda t, p: write(t, p / "x.xlsx"), r"write\.path must end in the name of a format"),
         (lambda t, p: write(t, p / "x.csv", units={"load": "N"}), "must name channels"),
         (lambda t, p: write(t, p / "x.csv", units={"normal force": "um"}), "um"),
+        (
+            lambda t, p: write(Trace(TIME, {"g": Channel(TIME)}), p / "x.csv", units={"g": "N"}),
+            "be known to be converted",
+        ),
         (lambda t, p: write(t, p / "nowhere" / "x.csv"), "folder that exists"),
         (lambda t, p: Recorder(rate="0 Hz"), "Recorder.rate must be positive"),
         (lambda t, p: Recorder(rate="1 kHz", bits=40), "Recorder.bits"),

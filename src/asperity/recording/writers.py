@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -14,10 +15,12 @@ from asperity.arrays import Float
 from asperity.errors import InputError, closest, require_known
 from asperity.outputs import output_file, written_file
 from asperity.parameters.arguments import typed
+from asperity.recording.readers.units import split_labels
 from asperity.recording.trace import Trace
 from asperity.units import KINDS
 
-#: Unit and values of each channel in the file.
+#: Unit and values of each channel in the file. The unit of a pure number is 1, an unknown one is
+#: empty.
 _Columns = Mapping[str, tuple[str, Float]]
 
 #: Rows that are formatted at a time.
@@ -71,24 +74,31 @@ def check_path(path: str | os.PathLike[str], label: str = "write.path") -> Path:
 def _columns(trace: Trace, units: Mapping[str, str]) -> _Columns:
     columns = {}
     for name, channel in trace.channels.items():
-        if channel.kind is None:
-            columns[name] = (channel.recorded_unit, channel.values)
-            continue
-        unit = units.get(name, KINDS[channel.kind].si)
-        values = channel.values if unit == channel.unit else channel.to(unit)
-        columns[name] = (unit, values)
+        recorded = channel.recorded_unit if channel.kind is None else KINDS[channel.kind].si or "1"
+        converted = channel.to(units[name]) if name in units else channel.values
+        columns[name] = (units.get(name, recorded), converted)
     return columns
+
+
+def _heading(name: str, unit: str) -> str:
+    """Name with its unit in brackets; a pure number has none unless its name looks like one."""
+    if unit != "1":
+        return f"{name} ({unit})" if unit else name
+    return name if split_labels([name]) == [(name, "")] else f"{name} (-)"
 
 
 def _write_text(trace: Trace, columns: _Columns, path: Path) -> None:
     """A line of headings with units where there are some, then a row a sample."""
     delimiter = "\t" if path.suffix.lower() == ".txt" else ","
-    headings = [f"{name} ({unit})" if unit else name for name, (unit, _) in columns.items()]
+    headings = [_heading(name, unit) for name, (unit, _) in columns.items()]
     values = [trace.time, *(column for _, column in columns.values())]
     # Time stamps keep the digits of their interval however long the recording is.
     formats = ["%.15g", *["%.9g"] * len(columns)]
     with path.open("w", encoding="utf-8", newline="\n") as stream:
-        stream.write(delimiter.join(["time (s)", *headings]) + "\n")
+        # A name that holds the delimiter stands in quotes.
+        csv.writer(stream, delimiter=delimiter, lineterminator="\n").writerow(
+            ["time (s)", *headings]
+        )
         for begin in range(0, len(trace), _ROWS):
             rows = np.column_stack([column[begin : begin + _ROWS] for column in values])
             np.savetxt(stream, rows, formats, delimiter)
@@ -104,7 +114,7 @@ def _write_hdf5(trace: Trace, columns: _Columns, path: Path) -> None:
         for name, (unit, values) in columns.items():
             # A slash would make a group of the channel's name.
             made = file.create_dataset(name.replace("/", " per "), data=values)
-            made.attrs["units"] = unit or "1"
+            made.attrs["units"] = unit
 
 
 def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
