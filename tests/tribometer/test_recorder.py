@@ -152,6 +152,18 @@ def test_names_and_units_of_any_channel_come_back(tmp_path, suffix) -> None:
     assert back.channels["Gauge"].kind is None
 
 
+@pytest.mark.parametrize("suffix", ["csv", "h5", "tdms"])
+@pytest.mark.parametrize("name", ["time", "Time", "Zeit"])
+def test_recorded_times_do_not_replace_the_clock(tmp_path, suffix, name) -> None:
+    if suffix == "tdms":
+        pytest.importorskip("nptdms")
+    time = np.arange(50) / 10
+    channels = {name: Channel(time * 3, "time", "s"), "load": Channel(7 + time, "force", "N")}
+    back = read(write(Trace(time, channels), tmp_path / f"a.{suffix}"))
+    np.testing.assert_allclose(back.time, time, atol=1e-12)
+    assert len(back.channels) == 2
+
+
 def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
     pytest.importorskip("nptdms")
     time = laboratory.time.copy()

@@ -16,6 +16,7 @@ from asperity.errors import InputError, closest, require_known
 from asperity.outputs import output_file, written_file
 from asperity.parameters.arguments import typed
 from asperity.recording.readers.units import split_labels
+from asperity.recording.roles import candidates, words
 from asperity.recording.trace import Trace
 from asperity.units import KINDS
 
@@ -76,7 +77,9 @@ def _columns(trace: Trace, units: Mapping[str, str]) -> _Columns:
     for name, channel in trace.channels.items():
         recorded = channel.recorded_unit if channel.kind is None else KINDS[channel.kind].si or "1"
         converted = channel.to(units[name]) if name in units else channel.values
-        columns[name] = (units.get(name, recorded), converted)
+        # Times that a rate of the user has replaced are not the clock of the file.
+        kept = f"recorded {name}" if "".join(words(name)) in ("time", "t") else name
+        columns[kept] = (units.get(name, recorded), converted)
     return columns
 
 
@@ -118,7 +121,10 @@ def _write_hdf5(trace: Trace, columns: _Columns, path: Path) -> None:
 
 
 def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
-    """One group of waveforms of one clock; an uneven clock is a further channel."""
+    """One group of waveforms of one clock.
+
+    A clock that is uneven, or not the only one, is a further channel.
+    """
     from asperity.recording.readers.tdms import library
 
     nptdms = library("write.path", "be in a format that can be written here", path)
@@ -131,7 +137,7 @@ def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
         nptdms.ChannelObject(_GROUP, name, np.asarray(values), {**clock, "unit_string": unit})
         for name, (unit, values) in columns.items()
     ]
-    if rate is None:
+    if rate is None or candidates("time", dict.fromkeys(columns)):
         stamps = {"unit_string": "s"}
         channels.insert(0, nptdms.ChannelObject(_GROUP, "time", np.asarray(trace.time), stamps))
     title = nptdms.RootObject({"name": str(trace.provenance.get("title", ""))})
