@@ -79,6 +79,15 @@ def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise, fitte
         assert mine.se == pytest.approx(known.se * expected / ERROR, rel=0.02)
 
 
+def test_an_error_is_an_uncertainty_too_as_in_lock_in_tables(tmp_path):
+    path = tmp_path / "holds.csv"
+    path.write_text("hold_time,healing,healing_uncertainty,V,K\n10,0.01,2e-4,1e-6,1e4\n")
+    assert read_healing(path).errors.tolist() == [2e-4]
+    path.write_text("hold_time,healing,healing_uncertainty,healing_err,V,K\n10,1,2e-4,1,1,1\n")
+    with pytest.raises(InputError, match="must have one column of errors"):
+        read_healing(path)
+
+
 def test_a_wrong_row_is_named(exact, noise):
     healing = exact[1] + noise
     healing[3] += 30 * ERROR

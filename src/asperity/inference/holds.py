@@ -40,6 +40,8 @@ _KINDS = {
     "K": ("per_length", "positive"),
     "W0": ("force", "positive"),
 }
+#: The other name of the errors, as in lock-in tables.
+_UNCERTAINTY = "healing_uncertainty"
 _REQUIRED = ("hold_time", HEALING, "V", "K")
 #: Fields of a table that always have a value in each row.
 _COLUMNS = (*_REQUIRED, "row_names")
@@ -102,9 +104,9 @@ def read_healing(
     ----------
     path : str or Path
         Columns ``hold_time``, ``healing``, ``V`` and ``K``, in SI or with the unit after the name,
-        as ``K (1/um)``; ``healing_err``, the standard uncertainty, if it is known. K is over the
-        normal load, or in N/m if there is a column ``W0``. Lines that begin with ``#``, and other
-        columns, are skipped.
+        as ``K (1/um)``; ``healing_err`` or ``healing_uncertainty``, the standard uncertainty, if it
+        is known. K is over the normal load, or in N/m if there is a column ``W0``. Lines that begin
+        with ``#``, and other columns, are skipped.
     given : mapping of str to number or str, optional
         Values of V, K and W0 if they are the same in all rows.
     name : str
@@ -116,7 +118,7 @@ def read_healing(
         If the file cannot be read, a column is missing, or a cell breaks its rule.
     """
     path = Path(path)
-    columns = read_headed_columns(path, _KINDS, row="a hold")
+    columns = read_headed_columns(path, {*_KINDS, _UNCERTAINTY}, row="a hold")
     for number in given or {}:
         field, got = Argument("fixed", number), "a column of the data too"
         advice = "leave it out, or remove the column"
@@ -140,6 +142,10 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
     InputError
         If a column is missing, has another length, or breaks its rule.
     """
+    if _UNCERTAINTY in columns:
+        rule, got = "have one column of errors", f"healing_err and {_UNCERTAINTY}"
+        require("healing_err" not in columns, name, rule, got, "remove one of them")
+        columns = {"healing_err" if n == _UNCERTAINTY else n: v for n, v in columns.items()}
     missing = [n for n in _REQUIRED if n not in columns]
     if missing:
         raise InputError(
