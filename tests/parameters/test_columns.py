@@ -54,6 +54,20 @@ def test_an_underscore_in_a_number_is_refused(tmp_path):
         read_headed_columns(written(tmp_path / "h.csv", [("x",), ("2_5",)]), ["x"])
 
 
+def test_a_row_of_more_cells_than_the_heading_is_refused(tmp_path):
+    """The comma of a thousand moves all cells after it."""
+    path = tmp_path / "t.csv"
+    path.write_text("V,K\n1e-6,2e5\n1,000,2e5\n")
+    with pytest.raises(InputError, match="as many cells as the heading, got 3 in row 2"):
+        read_headed_columns(path, ["V", "K"])
+
+
+def test_brackets_within_a_unit_belong_to_it(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("V,eta (N/(m/s))\n1e-6,20\n")
+    assert read_headed_columns(path, ["V", "eta"])["eta"] == ["20.0 N/(m/s)"]
+
+
 def test_commas_next_to_points_are_no_decimal_marks(tmp_path):
     # 1,234 may be a thousand.
     rows = [("V", "W0"), ("0.5", "1,234"), ("0.6", "1,5")]

@@ -25,7 +25,7 @@ _DELIMITERS = (",", ";", "\t")
 #: Bytes that are decoded at a time.
 _BLOCK = 1 << 20
 #: A name and its unit.
-_HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+_HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[](.*)[)\]])?\s*", re.S)
 _WITH_COMMA = re.compile(r"\s*[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?\s*")
 _WITH_POINT = re.compile(r"\s*[+-]?(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?\s*")
 #: Units of pure numbers.
@@ -61,12 +61,19 @@ def read_headed_columns(
     Raises
     ------
     InputError
-        If the file cannot be read, has no rows, a column twice, or a cell that is no number.
+        If the file cannot be read, has no rows, a column twice, a row with more cells than the
+        heading, or a cell that is no number.
     """
     with readable(path, label):
         content = file_content(path)
     table = sheet(path, set(numbers).__contains__, label=label, content=content)
     cells = [[cell.strip() for cell in row] for row in table.rows()]
+    for n, cells_of_row in enumerate(cells, 1):
+        # Spreadsheets leave separators behind the last column.
+        surplus = any(cells_of_row[len(table.heading) :])
+        rule, got = "have as many cells as the heading", f"{len(cells_of_row)} in row {n}"
+        advice = "write numbers without a thousands separator, and quote a cell that holds a comma"
+        require(not surplus, path.name, rule, got, advice)
     rule = f"have a heading and {row} a row"
     require(cells, path.name, rule, "no rows", "add them")
     columns: dict[str, list[float | str]] = {}
