@@ -140,6 +140,22 @@ def test_a_recording_across_the_midnight_of_a_twelfth_day_has_all_its_times(writ
     assert trace.provenance["time"].endswith("2024-01-12 23:59:58")
 
 
+@pytest.mark.parametrize("date", ["2024-10-{}", "{}.10.2024", "10/{}/2024"])
+@pytest.mark.parametrize("clocks", [("10:00:00", "13:00:00"), ("10:00:00 AM", "01:00:00 PM")])
+def test_times_of_day_belong_to_the_dates_next_to_them(written, date, clocks):
+    # A pause of two days and three hours.
+    rows = [f"{date.format(27)},{clocks[0]},10,5\n", f"{date.format(29)},{clocks[1]},11,6\n"]
+    trace = read(written("Date,Time,Load (N),Shear (N)\n" + "".join(rows)))
+    assert trace.time.tolist() == [0, 2 * 86400 + 3 * 3600]
+    assert trace.findings == ()
+    assert list(trace.channels) == ["Load", "Shear"]
+
+
+def test_one_date_in_all_rows_is_that_of_the_beginning(written):
+    text = "Date,Time,Load (N),Shear (N)\n12.03.2024,23:59:59,10,5\n12.03.2024,00:00:01,11,6\n"
+    assert read(written(text)).time.tolist() == [0, 2]
+
+
 @pytest.mark.parametrize("part", [0.01, 0.6])
 def test_gzip_that_is_cut_is_refused(written, part):
     packed = gzip.compress(PLAIN.encode())

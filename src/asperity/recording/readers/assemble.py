@@ -83,7 +83,7 @@ def assemble(
     findings += clock.findings
     channels, dropped = {}, []
     for name, column in recorded_columns.items():
-        if name == clock.column:
+        if name in (clock.column, clock.dates):
             continue
         if column.values.dtype.kind not in "iufb":
             dropped.append(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
 #: Orders of day and month, each with both clocks.
 _DATES = ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y", "%d.%m.%y", "%m/%d/%y", "%d/%m/%y")
+_DATES += ("%Y-%m-%d", "%Y/%m/%d")
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+_DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}")
 _MINUTES = r"\d{1,3}:\d{2}(?:\.\d+)?"
 _HOURS = r"(?:\d{1,4} days? )?[+-]?\d{1,6}:\d{1,2}:\d{1,2}(?:\.\d+)?"
 _DAY = 86400.0
@@ -43,12 +46,15 @@ class Clock:
         The column that became time.
     findings : list of Finding
         Assumptions about the clock.
+    dates : str or None
+        The column of dates that belong to its times of day.
     """
 
     time: Float
     source: str
     column: str | None = None
     findings: list[Finding] = field(default_factory=list)
+    dates: str | None = None
 
 
 def settle_time(
@@ -85,7 +91,7 @@ def settle_time(
         return Clock(time, f"interval of {recorded.step:.10g} s in the file")
     for name, raw in values.items():
         if raw.dtype.kind not in "iufb" and _elapsed(raw[:1]) is not None:
-            return _from_dates(name, raw)
+            return _from_dates(name, values)
     return _from_first_column(values, units, recorded)
 
 
@@ -116,7 +122,7 @@ def _from_first_column(
 def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[str, Unit]) -> Clock:
     raw = values[name]
     if raw.dtype.kind not in "iufb":
-        return _from_dates(name, raw)
+        return _from_dates(name, values)
     unit = units.get(name)
     findings = []
     if unit is None:
@@ -128,14 +134,30 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
     return Clock(in_si(raw, unit), f"column '{name}'", name, findings)
 
 
-def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
-    """Seconds since the first stamp, of dates or of hours:minutes:seconds."""
+def _from_dates(name: str, values: Mapping[str, NDArray[Any]]) -> Clock:
+    """Seconds since the first stamp, of dates, or of times of day with or without their dates."""
+    raw = values[name]
+    for other, dates in values.items():
+        if "elapsed" in words(name) or dates.dtype.kind in "iufb" or not _are_dates(dates):
+            continue
+        of_days = _elapsed(np.array([f"{d} {t}" for d, t in zip(dates, raw, strict=True)]))
+        if of_days is not None and np.isfinite(of_days[0]).all():
+            # One date in all rows is that of the beginning.
+            one = bool(np.all(dates == dates[0]))
+            time = _across_midnights(of_days[0]) if one else of_days[0]
+            source = f"columns '{other}' and '{name}', since {of_days[1]}"
+            return Clock(time, source, name, dates=other)
     stamps = _elapsed(raw)
     if stamps is None:
         rule = "hold numbers, dates or hours:minutes:seconds"
         advice = f"choose another column, or give {Argument('rate', value='10 kHz')}"
         raise InputError(Argument("columns", "time"), rule, f"'{raw[0]}' in '{name}'", advice)
     return Clock(stamps[0], f"column '{name}', since {stamps[1]}", name)
+
+
+def _are_dates(raw: NDArray[Any]) -> bool:
+    """Whether texts are dates without times."""
+    return all(isinstance(text, str) and _DATE.fullmatch(text.strip()) for text in raw)
 
 
 def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
@@ -168,10 +190,13 @@ def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
     if times.isna().all():
         return None
     origin = times[times.first_valid_index()]
-    seconds = _seconds(times - origin)
-    # A time of day falls by a day at midnight; a wrong stamp falls by less.
+    return _across_midnights(_seconds(times - origin)), str(origin)
+
+
+def _across_midnights(seconds: Float) -> Float:
+    """Times of day as rising times: they fall by a day at midnight; a wrong stamp falls by less."""
     steps = np.diff(seconds, prepend=seconds[:1])
-    return seconds + _DAY * np.cumsum(steps < -_DAY / 2), str(origin)
+    return seconds + _DAY * np.cumsum(steps < -_DAY / 2)
 
 
 def _by_order(texts: pd.Series[str]) -> pd.Series[Any] | None:
