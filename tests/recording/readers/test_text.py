@@ -214,6 +214,21 @@ def test_words_among_numbers_with_decimal_commas_are_named(written, planted, row
     assert np.array_equal(trace.channel("W").values[:7], planted.W[:7])
 
 
+@pytest.mark.parametrize(
+    ("second", "expected"),
+    [
+        ("time_s,W_N,F_N", ["text row"]),
+        ("time_s,F_N,W_N", ["text row", "heading mismatch"]),
+        ("time (ms),W_N,F_N", ["text row", "heading mismatch"]),
+        ("second,part,here", ["text row"]),
+    ],
+)
+def test_another_heading_between_the_rows_is_named(written, planted, second, expected):
+    lines = table(planted).splitlines()
+    body = "\n".join([*lines[:200], second, *lines[200:]])
+    assert names(read(written(f"time_s,W_N,F_N\n{body}\n"))) == expected
+
+
 def test_rows_with_too_many_cells_are_named(written, planted):
     lines = table(planted).splitlines()
     lines[5] += ",9"

@@ -254,10 +254,10 @@ def _names_of_another_width(
 
 def _quantities(row: Sequence[str]) -> int:
     """How many cells name a quantity."""
-    return sum(map(_names_a_quantity, row))
+    return sum(map(names_a_quantity, row))
 
 
-def _names_a_quantity(cell: str) -> bool:
+def names_a_quantity(cell: str) -> bool:
     """Whether a heading is the name of a role or holds a usual unit in brackets."""
     match = _WITH_UNIT.fullmatch(cell)
     if match and usual(match[1]):

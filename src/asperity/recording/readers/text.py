@@ -10,6 +10,7 @@ import gzip
 import io
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -18,7 +19,16 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.recording.finding import Finding
-from asperity.recording.readers.layout import MISSING, Layout, cells_of, digits, layout_of, lines_of
+from asperity.recording.readers.layout import (
+    MISSING,
+    Headings,
+    Layout,
+    cells_of,
+    digits,
+    layout_of,
+    lines_of,
+    names_a_quantity,
+)
 from asperity.recording.readers.raw import (
     RawColumn,
     RawRecording,
@@ -159,7 +169,7 @@ def _load(
     frame, findings = _parse(file, layout, ending.stop)
     if not len(frame):
         raise unusable(path, "which has a heading only", "hold rows of numbers", "give a recording")
-    frame, left_out = _without_text_rows(frame, layout.width, layout.decimal)
+    frame, left_out = _without_text_rows(frame, layout)
     findings += left_out
     columns = []
     for i, name in enumerate(layout.headings.names):
@@ -352,19 +362,16 @@ def _as_numbers(column: pd.Series[Any], decimal: str) -> pd.Series[Any]:
     return pd.to_numeric(column, errors="coerce")
 
 
-def _without_text_rows(
-    frame: pd.DataFrame, width: int, decimal: str
-) -> tuple[pd.DataFrame, list[Finding]]:
+def _without_text_rows(frame: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[Finding]]:
     """A table of numbers without rows of words, such as headings between parts and remarks.
 
     Parameters
     ----------
     frame : DataFrame
-        Columns 0 to `width` - 1; one that holds words only, such as dates, leaves all rows.
-    width : int
-    decimal : str
-        Decimal mark of numbers in text.
+        A column that holds words only, such as dates, leaves all rows.
+    layout : Layout
     """
+    width, decimal = layout.width, layout.decimal
     texts = [i for i, kind in enumerate(frame.dtypes) if i < width and kind.kind not in "iuf"]
     if not texts:
         return frame, []
@@ -381,8 +388,29 @@ def _without_text_rows(
         f"{count} {'row holds' if count == 1 else 'rows hold'} words and no number, the first "
         f"'{line}' in row {first}, and {'was' if count == 1 else 'were'} left out."
     )
-    left_out = Finding("text row", "note", count, f"row {first}", text)
-    return frame[~words].reset_index(drop=True), [left_out]
+    findings = [Finding("text row", "note", count, f"row {first}", text)]
+    for row in np.flatnonzero(words):
+        cells = [str(cell).strip() for cell in frame.iloc[row, :width]]
+        if _is_another_heading(cells, layout.headings):
+            text = (
+                f"Row {row} is another heading, '{' '.join(cells)[:_SHOWN]}': the rows from there "
+                "on were read by the first one. Split the file there."
+            )
+            findings.append(Finding("heading mismatch", "error", 1, f"row {row}", text))
+            break
+    return frame[~words].reset_index(drop=True), findings
+
+
+def _is_another_heading(cells: Sequence[str], headings: Headings) -> bool:
+    """Whether a row of words has other names or units of quantities than the headings."""
+    known = [[_plain(cell) for cell in row] for row in (headings.names, headings.units or [])]
+    quantities = sum(map(names_a_quantity, cells))
+    return 2 * quantities > len(cells) and [_plain(cell) for cell in cells] not in known
+
+
+def _plain(cell: str) -> str:
+    """A heading without what depends on the encoding of the file."""
+    return "".join(c for c in cell if c.isascii() and not c.isspace())
 
 
 def _numbers_of(
