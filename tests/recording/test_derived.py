@@ -200,6 +200,34 @@ def test_a_recipe_with_a_mistake_is_refused(tmp_path, text, rule):
         read(recording(tmp_path), recipe=recipe)
 
 
+def test_roles_and_times_of_the_user_go_before_expressions_of_a_recipe(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("Tick (s),Gauge (N),Shear (N)\n0,1,5\n2,2,6\n4,3,7\n")
+    recipe = ReadingRecipe(channels={"time": "Tick * 10", "force": "Gauge * 2"}, rate=None)
+    assert read(path, recipe=recipe).time.tolist() == [0, 20, 40]
+    assert read(path, recipe=recipe).channel("F").values.tolist() == [2, 4, 6]
+    assert read(path, recipe=recipe, rate="1 Hz").time.tolist() == [0, 1, 2]
+    trace = read(path, {"time": "Tick", "F": "Shear"}, recipe=recipe)
+    assert trace.time.tolist() == [0, 2, 4]
+    assert trace.channel("F").values.tolist() == [5, 6, 7]
+    by_rate = ReadingRecipe(rate="1 kHz")
+    assert read(path, {"time": "Tick"}, recipe=by_rate).time.tolist() == [0, 2, 4]
+
+
+@pytest.mark.parametrize(
+    ("options", "rule"),
+    [
+        ({"columns": {"F": "Gauge", "force": "Shear"}}, "F.* must be one column, got 'F' and 'fo"),
+        ({"columns": {"time": "Tick"}, "rate": "1 Hz"}, "left out next to a sampling rate"),
+    ],
+)
+def test_two_columns_for_one_role_are_refused(tmp_path, options, rule):
+    path = tmp_path / "run.csv"
+    path.write_text("Tick (s),Gauge (N),Shear (N)\n0,1,5\n2,2,6\n4,3,7\n")
+    with pytest.raises(InputError, match=rule):
+        read(path, **options)
+
+
 def test_a_missing_recipe_is_refused(tmp_path):
     with pytest.raises(InputError, match="recipe must be a file"):
         read(recording(tmp_path), recipe=tmp_path / "none.toml")

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.errors import Argument, InputError, known_as, require, require_known
-from asperity.parameters.arguments import FilePath, typed
+from asperity.parameters.arguments import FilePath, shown, typed
 from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive, stress_to_force
 from asperity.recording.finding import Finding
@@ -232,8 +232,13 @@ def read(
         recipe = ReadingRecipe.from_file(recipe)
     rules = ReadingRecipe() if recipe is None else recipe
     layout = {"group": group, "delimiter": delimiter, "decimal": decimal}
-    rate = rules.rate if rate is None else rate
-    expressions = {**rules.channels, **(channels or {})}
+    _require_one_each(columns or {}, rate)
+    # A role that the user gives goes before an expression of the recipe for it, and so do times.
+    chosen = {role_of(name) for name in columns or {}} | ({"time"} if rate is not None else set())
+    kept = {n: text for n, text in rules.channels.items() if (role_of(n) or n) not in chosen}
+    if rate is None and "time" not in chosen:
+        rate = rules.rate
+    expressions = {**kept, **(channels or {})}
     file = Path(path)
     with _quiet() as warned:
         # The recorded clock is an ordinary column until the expression for time is evaluated.
@@ -259,6 +264,19 @@ def read(
         provenance = {**trace.provenance, "recipe": rules.model_dump(exclude_defaults=True)}
         trace = replace(trace, provenance=provenance)
     return replace(trace, findings=(*trace.findings, *_library_warnings(warned)))
+
+
+def _require_one_each(columns: Mapping[str, Any], rate: float | str | None) -> None:
+    """Refuse two columns for one role, as F and force, and two ways to times."""
+    names: dict[str, str] = {}
+    for name in columns:
+        role = role_of(name) or name
+        got = f"'{names.get(role)}' and '{name}'"
+        require(role not in names, Argument("columns", role), "be one column", got, "leave one out")
+        names[role] = name
+    rule, got = "be left out next to a sampling rate", shown(columns.get(names.get("time", "")))
+    once = rate is None or "time" not in names
+    require(once, Argument("columns", "time"), rule, got, "give one of them")
 
 
 def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
