@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from asperity.recording.readers.raw import RawRecording
 
 #: Orders of day and month, each with both clocks.
-_DATES = ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y", "%d.%m.%y", "%m/%d/%y", "%d/%m/%y")
-_DATES += ("%Y-%m-%d", "%Y/%m/%d")
+_DATES = (
+    *("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y", "%Y-%m-%d", "%Y/%m/%d"),
+    *("%d.%m.%y", "%m/%d/%y", "%d/%m/%y"),
+)
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
 _DATE = re.compile(r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}")
 _MINUTES = r"\d{1,3}:\d{2}(?:\.\d+)?"
