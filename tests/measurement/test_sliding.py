@@ -353,3 +353,30 @@ def test_noise_alone_makes_no_healing(sliding_trace, draws) -> None:
         heals.append(hold.healing)
     # The largest of 2000 samples lies 3.4 standard deviations above the mean.
     assert np.mean(heals) < 1e-3
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_hold_of_the_opposite_direction_has_the_healing_of_the_forward_one(turns) -> None:
+    """Sliding forward and, for less than half of the time, backward, with holds of 10 s."""
+    time = np.arange(0, 320, 0.02)
+    holds = {40: 1, 220: -1, **({110: 1} if turns else {})}
+    resting = np.any([(time >= start) & (time < start + 10) for start in holds], axis=0)
+    direction = np.where(time < (120 if turns else 150), 1.0, -1.0)
+    friction = np.full(time.size, 0.6)
+    for start in holds:
+        since = time - start
+        relaxed = 0.005 * np.log1p(np.clip(since, 0, 10) / 0.1)
+        rise = np.clip((since - 10) / 0.5, 0, 1)
+        peak = 0.01 * rise * np.exp(-np.clip(since - 10.5, 0, None) / 2)
+        friction += np.where(since > 0, peak - relaxed * (1 - rise), 0.0)
+    rng = np.random.default_rng(4)
+    slip = np.cumsum(np.where(resting, 0.0, direction) * 1e-5 * 0.02)
+    noisy = direction * friction + 1e-4 * rng.standard_normal(time.size)
+    measurement = measure_sliding(recorded(time, friction=noisy, slip=slip))
+    forward, backward = measurement.holds
+    for hold in (forward, backward):
+        assert hold.level == pytest.approx(0.6, abs=1e-3)
+        assert hold.relaxation == pytest.approx(0.005 * np.log(101), rel=0.03)
+        assert hold.healing == pytest.approx(0.01, rel=0.1)
+    (cut,) = (check for check in measurement.checks if check.name == "segments")
+    assert ("the slider turns" in cut.sentence) == turns

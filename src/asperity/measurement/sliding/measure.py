@@ -189,8 +189,8 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
         for (a, b), v, hold in zip(pairwise(bounds), cut.velocities, cut.holds, strict=True)
     )
     read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
-    read_holds = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
-    doubts = [*cut.doubts, *unread, *_hidden_peaks(time, read_holds)]
+    read_holds, turns = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
+    doubts = [*cut.doubts, *unread, *turns, *_hidden_peaks(time, read_holds)]
     if times is None and signals.displacement is None:
         doubts.append(f"velocity steps cannot be seen: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
@@ -253,9 +253,7 @@ def _steps(
     rates = cut.rates or (Rate(0.0, 0.0, np.inf),) * len(cut.velocities)
     for (a, b), rate, velocity in zip(pairwise(bounds), rates, cut.velocities, strict=True):
         part = signals.friction[a:b]
-        # Friction is counted against the motion, whatever its direction.
-        turned = -1.0 if np.median(part) < 0 else 1.0
-        sides.append((signals.time[a:b], turned * part, rate._replace(value=velocity)))
+        sides.append((signals.time[a:b], _direction(part) * part, rate._replace(value=velocity)))
     # The first segment may begin with the loading.
     first = segments[0]
     speed = abs(first.velocity) if np.isfinite(first.velocity) and first.velocity else 1.0
@@ -288,13 +286,20 @@ def _holds(
     segments: tuple[SlidingSegment, ...],
     degree: int,
     recorded: float,
-) -> list[HoldReading]:
-    holds = []
+) -> tuple[list[HoldReading], list[str]]:
+    """Holds between two sliding segments, and sentences on holds that cannot be read."""
+    holds: list[HoldReading] = []
+    unread: list[str] = []
     for k, hold in enumerate(cut.holds):
         if not hold or k in (0, len(cut.holds) - 1):
             continue
         a, b, c, d = bounds[k - 1 : k + 3]
         if min(b - a, d - c) < _FEWEST or c - b < 2:
+            continue
+        direction = _direction(signals.friction[a:b])
+        if direction != _direction(signals.friction[c:d]):
+            at = cut.cuts[k - 1].time
+            unread.append(f"after the hold at {at:.6g} s the slider turns: it has no healing")
             continue
         # Sliding may settle from the hold before it; the first sliding may begin with the loading.
         begin = a + int(_SETTLING * (b - a))
@@ -304,7 +309,7 @@ def _holds(
         holds.append(
             read_hold(
                 signals.time,
-                signals.friction,
+                direction * signals.friction,
                 signals.displacement,
                 (begin, b, c, d),
                 (cut.cuts[k - 1].time, cut.cuts[k].time),
@@ -314,7 +319,12 @@ def _holds(
                 recorded=recorded,
             )
         )
-    return holds
+    return holds, unread
+
+
+def _direction(friction: Float) -> float:
+    """Sign that makes the friction of a segment count against the motion."""
+    return -1.0 if np.median(friction) < 0 else 1.0
 
 
 def _hidden_peaks(time: Float, holds: list[HoldReading]) -> list[str]:
