@@ -97,3 +97,34 @@ def test_bad_input_is_named(options, message) -> None:
 def test_a_recording_without_cycles_is_refused(recordings) -> None:
     with pytest.raises(InputError, match="two cycles"):
         elastic_length(recordings[0].slice(0, 4))
+
+
+def _planted(kinds, signs=(1, 1, 1), spring=np.inf):
+    """Loading and unloading; kinds of force and load, signs of displacement, force and load."""
+    time = np.arange(0, 60, 0.01)
+    force = 1.0 + np.abs((time / 5) % 2 - 1)
+    values = (0.8e-6 / 7 + 1 / spring) * force, force, np.full(time.size, 7.0)
+    names = "displacement", "shear force", "normal force"
+    units = {"length": "m", "force": "N", "pressure": "Pa"}
+    channels = {
+        name: Channel(sign * v, kind, units[kind])
+        for name, sign, v, kind in zip(names, signs, values, ("length", *kinds), strict=True)
+    }
+    return Trace(time, channels)
+
+
+@pytest.mark.parametrize("signs", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, -1)])
+def test_signs_of_the_recorder_do_not_matter(signs) -> None:
+    trace = _planted(("force", "force"), signs, spring=2e5)
+    measured = elastic_length(trace, spring="0.2 N/um")
+    assert measured.lambda_ == pytest.approx(0.8e-6, rel=1e-9)
+    assert measured.stiffness > 0
+
+
+def test_stresses_have_a_length_but_not_with_a_spring() -> None:
+    measured = elastic_length(_planted(("pressure", "pressure")))
+    assert measured.lambda_ == pytest.approx(0.8e-6, rel=1e-9)
+    with pytest.raises(InputError, match="spring must go with a force"):
+        elastic_length(_planted(("pressure", "pressure"), spring=2e5), spring="0.2 N/um")
+    with pytest.raises(InputError, match=r"elastic_length\.force must have the dimension"):
+        elastic_length(_planted(("force", "pressure")))

@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import require
+from asperity.errors import Argument, InputError, require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Slide
+from asperity.measurement.samples import require_one_dimension
 from asperity.parameters.arguments import at_least, number, typed
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
@@ -130,7 +131,8 @@ def elastic_length(
     Raises
     ------
     InputError
-        If there are fewer than two pairs of loading and unloading.
+        If there are fewer than two pairs of loading and unloading, one of force and load is a
+        stress, or `spring` is given and both are.
 
     Notes
     -----
@@ -139,21 +141,32 @@ def elastic_length(
     """
     from scipy.signal import find_peaks
 
-    F, x, W = (trace.channel(name).values for name in (force, displacement, load))
+    shear, moved, normal = (trace.channel(name) for name in (force, displacement, load))
+    try:
+        require_one_dimension(normal, shear, load, force)
+    except InputError as error:
+        raise error.about("elastic_length.force") from None
+    F, x, W = shear.values, moved.values, normal.values
     K = None if spring is None else to_si(spring, "stiffness", "elastic_length.spring")
+    rule, area = "go with a force", Argument("read.area", value="25 cm^2")
+    forces = K is None or shear.kind == "force"
+    require(forces, "elastic_length.spring", rule, f"'{force}' in {shear.unit or '1'}",
+            f"give the area that makes the stress a force, like {area}")  # fmt: skip
     reach = _TURN * float(np.ptp(F))
     turns = np.sort(np.concatenate([find_peaks(f, prominence=reach)[0] for f in (F, -F)]))
     branches = list(pairwise([*turns, F.size - 1]))
-    slopes, lengths = [], []
+    slopes, loads = [], []
     for a, b in branches[: 2 * (len(branches) // 2)]:
         rim = max(int(_TRIM * (b - a)), 1)
         cut = slice(a + rim, b - rim)
-        slope = np.polynomial.Polynomial.fit(F[cut], x[cut], 1).convert().coef[1]
-        slopes.append(slope)
-        lengths.append(np.mean(W[cut]) * (slope - (0.0 if K is None else 1 / K)))
+        slopes.append(np.polynomial.Polynomial.fit(F[cut], x[cut], 1).convert().coef[1])
+        loads.append(abs(np.mean(W[cut])))
+    # The signs of force, displacement and load are conventions of the recorder.
+    compliance = np.array(slopes) * np.sign(np.sum(slopes))
+    lengths = np.array(loads) * (compliance - (0.0 if K is None else 1 / K))
     pairs = np.reshape(lengths, (-1, 2)).mean(1)
     rule = "hold two cycles of loading and unloading at least"
     advice = "record more, or choose the channel of the shear force"
     require(pairs.size >= 2, "elastic_length.trace", rule, pairs.size, advice)
     uncertainty = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
-    return ElasticLength(float(pairs.mean()), uncertainty, pairs, float(1 / np.mean(slopes)))
+    return ElasticLength(float(pairs.mean()), uncertainty, pairs, float(1 / np.mean(compliance)))
