@@ -50,6 +50,7 @@ def test_holds_are_those_of_scipy(name):
     ).T
     level, low, high, slip, more = exact
     assert mine.has_maximum.all()
+    assert mine.outcomes() == "8 points, followed to the extremum only"
     np.testing.assert_allclose(mine.level, 0.6 + level, atol=1e-12)
     np.testing.assert_allclose(mine.minimum, 0.6 + low, atol=1e-9)
     np.testing.assert_allclose(mine.healing, high - level, atol=1e-9)

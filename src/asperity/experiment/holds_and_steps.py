@@ -75,8 +75,11 @@ class _Memory(Labelled):
 
     def outcomes(self) -> str:
         """Number of points, and number of those that do not settle."""
-        lost = sum(text != _SENTENCES[End.STEADY] for text in self.result.ravel())
-        return f"{self.result.size} points" + (f", {lost} of which do not settle" if lost else "")
+        texts = self.result.ravel()
+        first = texts == _SENTENCES[End.CROSSING]
+        lost = int(np.sum((texts != _SENTENCES[End.STEADY]) & ~first))
+        points = f"{texts.size} points" + (", followed to the extremum only" if first.any() else "")
+        return points + (f", {lost} of which do not settle" if lost else "")
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
