@@ -291,3 +291,12 @@ def test_the_phase_of_an_absent_harmonic_is_unknown(truth) -> None:
     assert reading.half_width("phase2") == pytest.approx(np.pi)
     assert reading.uncertainty("phase2") <= np.pi / np.sqrt(3)
     assert reading.half_width("phase1") < np.pi
+
+
+def test_a_parabola_of_load_and_force_is_a_drift_though_it_ends_where_it_began(steady, trace):
+    time, load, force = steady()
+    bent = 0.06 * (2 * time / END - 1) ** 2
+    recording = trace(time, load + bent * load.mean(), force + bent * force.mean())
+    measurement = measure(recording, detrend="quadratic")
+    numbers = {c.name: c.number for c in measurement.checks if c.verdict == "bad"}
+    assert numbers == pytest.approx({"steady load": 0.06 / 1.02, "drift": 0.06 / 1.02}, rel=0.01)

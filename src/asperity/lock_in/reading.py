@@ -18,6 +18,8 @@ from asperity.lock_in.settling import Settling
 PIECE = 1 << 16
 #: Standard deviation (rad) of an angle that is uniform over the circle, pi/sqrt(3).
 _UNKNOWN_PHASE = math.pi / math.sqrt(3)
+#: Points of a window at which the range of the drift is taken.
+_ALONG = 101
 
 _SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
 
@@ -113,6 +115,8 @@ class LockInReading:
         Change of load and force from the first to the last sample, by each drift term.
     drift_uncertainty : array, (2, degree)
         Their standard uncertainties.
+    drift_range : array, (2,)
+        Largest less smallest value of the fitted drift of load and force in the window.
     start, end : float
         First and last time (s) of the window.
     samples : int
@@ -138,6 +142,7 @@ class LockInReading:
     dof: Float
     drift: Float
     drift_uncertainty: Float
+    drift_range: Float
     start: float
     end: float
     samples: int
@@ -292,6 +297,7 @@ def reading_of(
     across = (1 - (-1.0) ** powers)[:, None]
     variances = np.diagonal(covariance).clip(min=0)
     uncertainties = np.sqrt([variances[1:first], variances[linear + fitted :][1:first]]).T
+    along = np.linspace(-1, 1, _ALONG)[:, None] ** np.arange(first)
     return LockInReading(
         W0=float(mean_load),
         epsilon=float(abs(relative[0, 0])),
@@ -305,6 +311,7 @@ def reading_of(
         dof=noise.dof,
         drift=(beta[1:first] * across).T,
         drift_uncertainty=(uncertainties * across).T,
+        drift_range=np.ptp(along @ beta[:first], axis=0),
         start=basis.centre - basis.half_width,
         end=basis.centre + basis.half_width,
         samples=int(blocks.count.sum()),

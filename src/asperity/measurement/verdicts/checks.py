@@ -83,7 +83,8 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
         sentence = f"F(0) after the modulation differs by {percent(share)} from F(0) before it"
         significant = abs(change) > 3 * doubt
     else:
-        change = float(reading.drift[1].sum())
+        # A parabola may end where it began.
+        change = float(np.copysign(reading.drift_range[1], reading.drift[1].sum()))
         share = change / _nonzero(reading.mean_force)
         sentence = (
             f"the force drifts by {percent(share)} over the window; F(0) before and after is not "

@@ -108,11 +108,11 @@ def steady_response(reading: LockInReading) -> Check:
 def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
     """Whether the load's mean stays where it is."""
     slow, seen = _wander(reading, time, load)
-    drift = float(reading.drift[0].sum())
-    number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
-    motion = "drifts" if abs(drift) > slow else "wanders"
-    if abs(drift) > slow:
-        seen = abs(drift) > 10 * reading.uncertainty("W0")
+    drift = float(reading.drift_range[0])
+    number = max(drift, slow) / max(abs(reading.W0), 1e-300)
+    motion = "drifts" if drift > slow else "wanders"
+    if drift > slow:
+        seen = drift > 10 * reading.uncertainty("W0")
     text = f"the mean load {motion} by {percent(number)} in the window, apart from its modulation"
     return LOCK_IN.check("steady load", number, text, significant=seen)
 
