@@ -11,8 +11,9 @@ import xarray as xr
 
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
-from asperity.measurement.campaign import run_campaign
+from asperity.measurement.campaign import labelled_rows, run_campaign, sliding_rows
 from asperity.measurement.measure import measure_amplitudes
+from asperity.measurement.sliding.measure import measure_sliding
 from asperity.outputs import Interrupted
 from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
@@ -194,3 +195,15 @@ def test_a_recording_is_not_overwritten(amplitudes, tmp_path) -> None:
     with pytest.raises(InputError, match=r"a\.csv"):
         run_campaign([file], ROWS, file, inputs={})
     assert file.read_bytes() == amplitudes.read_bytes()
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_settling_slip_of_a_table_is_a_length(pulled, sliding_trace, known) -> None:
+    time, _, _, friction, bounds = pulled((3e-6, 10e-6), (4e-4, 6e-4), (50, 50))
+    velocities = (3e-6, 10e-6) if known else None
+    question = Question(steps=bounds[1:2], velocities=velocities)
+    measurement = measure_sliding(sliding_trace(time, friction), question)
+    table = labelled_rows(sliding_rows(Path("run.csv"), measurement))
+    assert table.settling_slip.units == "m"
+    (slip,) = table.settling_slip.values
+    assert 0 < slip < 6e-4 if known else np.isnan(slip)

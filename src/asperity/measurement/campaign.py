@@ -228,10 +228,7 @@ def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
     """Rows of the velocity steps and holds of one recording; of its mean friction without any."""
     friction, healing = measurement.friction, measurement.healing
     parts: list[tuple[str, float, float, Row]] = [
-        *(
-            ("step", s.time, s.time, _columns_of(s) | {"change_uncertainty": s.uncertainty})
-            for s in measurement.steps
-        ),
+        *(("step", s.time, s.time, _columns_of_step(s)) for s in measurement.steps),
         *(("hold", h.start, h.end, _columns_of(h)) for h in measurement.holds),
     ]
     parts = sorted(parts, key=lambda part: part[1]) or [("level", friction.start, friction.end, {})]
@@ -246,6 +243,13 @@ def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
         first_columns(path, k, kind, start, end, measurement) | columns | more
         for k, (kind, start, end, columns) in enumerate(parts, 1)
     ]
+
+
+def _columns_of_step(step: VelocityStep) -> Row:
+    # Without velocities the settling slip is a time.
+    slip = step.settling_slip if math.isfinite(step.velocity_before) else math.nan
+    more = {"change_uncertainty": step.uncertainty, "settling_slip": slip}
+    return _columns_of(step) | more
 
 
 def _columns_of(reading: VelocityStep | HoldReading) -> Row:
