@@ -380,3 +380,12 @@ def test_a_hold_of_the_opposite_direction_has_the_healing_of_the_forward_one(tur
         assert hold.healing == pytest.approx(0.01, rel=0.1)
     (cut,) = (check for check in measurement.checks if check.name == "segments")
     assert ("the slider turns" in cut.sentence) == turns
+
+
+def test_between_equal_velocities_there_is_no_rate_dependence() -> None:
+    time, _, friction = velocity_step()
+    (step,) = measure_sliding(
+        recorded(time, friction=friction), steps=[60], velocities=["10 um/s", "10 um/s"]
+    ).steps
+    assert np.isfinite(step.change)
+    assert np.isnan([step.rate_dependence, step.rate_uncertainty, step.peak]).all()

@@ -90,11 +90,11 @@ class VelocityStep:
         Half of the 95 % interval of `change`.
     rate_dependence, rate_uncertainty, rate_interval_95 : float
         A - B = change/ln(V2/V1): positive where friction rises with velocity (a - b of
-        geophysics); NaN without velocities or where the direction turns. The uncertainty includes
-        that of measured velocities.
+        geophysics); NaN without velocities, where the direction turns or where both velocities are
+        the same. The uncertainty includes that of measured velocities.
     peak : float
         Extreme of friction after the step, in the direction of the velocity's change, less the
-        level before; NaN without velocities.
+        level before; NaN where `rate_dependence` is.
     trend : str
         "none", "one slope" or "two slopes", as the data require.
     slope_before, slope_after : float
@@ -295,19 +295,18 @@ def _result(
     uncertainty = float(np.hypot(from_noise, spread))
     half = float(stdtrit(dof, 0.975)) * uncertainty
     velocities = before[2].value, after[2].value
-    turned = known and velocities[0] * velocities[1] < 0
-    lever = float(np.log(abs(velocities[1] / velocities[0]))) if known and not turned else np.nan
+    changed = known and velocities[0] * velocities[1] > 0 and velocities[0] != velocities[1]
+    lever = float(np.log(velocities[1] / velocities[0])) if changed else np.nan
     middle = readings[len(readings) // 2]
     slopes = [float(fit.beta[1]) if degree else 0.0 for fit in middle[3:]]
     level = float(np.mean([left.beta[0] for *_, left, _ in readings]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rate = float(np.divide(mean, lever))
-        # The logarithm of the velocities' ratio is as uncertain as the velocities.
-        parts = [(float(np.divide(uncertainty, abs(lever))), dof)]
-        parts += [
-            (float(np.divide(abs(rate) * v.uncertainty, abs(v.value * lever))), v.dof)
-            for v in (before[2], after[2])
-        ]
+    rate = mean / lever
+    # The logarithm of the velocities' ratio is as uncertain as the velocities.
+    parts = [(uncertainty / abs(lever), dof)]
+    parts += [
+        (float(np.divide(abs(rate) * v.uncertainty, abs(v.value * lever))), v.dof)
+        for v in (before[2], after[2])
+    ]
     rate_uncertainty = float(np.sqrt(sum(part**2 for part, _ in parts)))
     return VelocityStep(
         time=time,
@@ -335,7 +334,7 @@ def _peak(
     times: Float, friction: Float, step: float, lever: float, settling: float, speed: float
 ) -> float:
     """Extreme of friction, smoothed over five samples, until the transient has settled."""
-    if not np.isfinite(lever) or lever == 0:
+    if not np.isfinite(lever):
         return np.nan
     near = times <= step + 1.5 * settling / speed
     near[: max(8, int(0.02 * times.size))] = True
