@@ -509,3 +509,13 @@ def test_the_frequency_at_the_threshold_is_extrapolated_to_cycles_without_drop()
 def test_a_threshold_that_is_not_bracketed_has_a_reason(rows, reason) -> None:
     (threshold,) = thresholds(rows)
     assert reason in threshold.reason
+
+
+def test_a_stated_load_that_contradicts_the_recorded_one_is_refused() -> None:
+    truth = saw(0, events=20, noise=0.01)
+    trace = recorded(truth.force)
+    load = Channel(np.full(truth.force.size, 5.0), "force", "N", "load", "N")
+    trace = replace(trace, channels={**trace.channels, "load": load})
+    assert measure_stick_slip(trace, normal_load=5.2).machine.load == 5.2
+    with pytest.raises(InputError, match="normal_load must agree with the recorded load, 5 N"):
+        measure_stick_slip(trace, normal_load=50.0)

@@ -20,10 +20,10 @@ from asperity.recording.finding import Finding
 from asperity.recording.roles import role_of
 from asperity.recording.trace import Channel, Trace, check
 
-#: Medians of F/W and of a recorded friction that differ by more than this share contradict each
-#: other. Corrections for jackets, seals and changing areas are some percent; a wrong unit, column
-#: or zero is more.
-_CONTRADICTS = 0.1
+#: Medians of F/W and of a recorded friction, and a load that is recorded and one that is stated,
+#: contradict each other if they differ by more than this share. Corrections for jackets, seals and
+#: changing areas are some percent; a wrong unit, column or zero is more.
+CONTRADICTS = 0.1
 
 #: Samples that a lock-in needs.
 _FEWEST = 16
@@ -153,7 +153,7 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
         return
     made, written = (float(np.median(values[both])) for values in (friction, recorded.values))
     # The sign of a shear is a convention of the recorder.
-    if abs(abs(made) - abs(written)) <= _CONTRADICTS * abs(written):
+    if abs(abs(made) - abs(written)) <= CONTRADICTS * abs(written):
         return
     one, other = (trace.name_of(used) for used in (shear, recorded))
     got = f"{made:.4g} for the median of F/W with '{one}' and {written:.4g} for that of '{other}'"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.errors import Argument, InputError
-from asperity.measurement.samples import about_channels
+from asperity.errors import Argument, InputError, require
+from asperity.measurement.samples import CONTRADICTS, about_channels
 from asperity.measurement.sliding.signals import (
     SlidingSignals,
     sliding_signals,
@@ -279,8 +279,12 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
 def _machine(question: Question, signals: SlidingSignals) -> Machine:
     """The machine as stated in the question, completed from the recording."""
     load, velocity = question.normal_load, question.velocity
-    if load is None and signals.load is not None and signals.load_unit == "N":
-        load = float(np.mean(signals.load))
+    if signals.load is not None and signals.load_unit == "N":
+        recorded = float(np.mean(signals.load))
+        rule, got = f"agree with the recorded load, {recorded:.4g} N", f"{load} N"
+        agree = load is None or abs(load - recorded) <= CONTRADICTS * abs(recorded)
+        require(agree, "measure.normal_load", rule, got, "leave it out, or correct one of them")
+        load = recorded if load is None else load
     if load is None and signals.load is None and question.mass is not None:
         load = question.mass * GRAVITY
     if velocity is None and signals.displacement is not None:
