@@ -148,6 +148,28 @@ def test_a_stream_gives_the_reading_of_one_call(truth) -> None:
         assert reading.uncertainty(name) == pytest.approx(whole.uncertainty(name), rel=0.02)
 
 
+@pytest.mark.parametrize("detrend", ["none", "linear", "quadratic"])
+def test_a_stream_that_is_not_finished_is_read_as_far_as_it_goes(truth, detrend) -> None:
+    time = np.arange(30_000) * 1e-3
+    rng = np.random.default_rng(4)
+    load = truth.load(time) + 0.02 * rng.standard_normal(time.size)
+    force = truth.force(time) + 0.05 * time + 0.01 * rng.standard_normal(time.size)
+    first = slice(10_000)
+    whole = lock_in(time[first], load[first], force[first], detrend=detrend)
+    stream = LockInStream(whole.frequency, start=time[0], end=time[-1], detrend=detrend)
+    stream.add(time[first], load[first], force[first])
+    reading = stream.read()
+    assert (reading.start, reading.end) == pytest.approx((whole.start, whole.end))
+    assert reading.periods == pytest.approx(whole.periods)
+    assert reading.mean_force == pytest.approx(whole.mean_force, rel=1e-12)
+    assert reading.mean_friction == pytest.approx(whole.mean_friction, rel=1e-12)
+    np.testing.assert_allclose(reading.drift[:, :1], whole.drift[:, :1], atol=1e-2)
+    np.testing.assert_allclose(reading.drift_range, whole.drift_range, atol=1e-9)
+    assert (reading.drift_uncertainty >= 0).all()
+    cycles = reading.cycles(time[first]) - whole.cycles(time[first])
+    np.testing.assert_allclose(cycles - np.rint(cycles), 0, atol=1e-9)
+
+
 def test_a_stream_corrects_its_frequency_to_first_order(truth) -> None:
     time = np.arange(30_000) * 1e-3
     error = 1e-2 / (np.pi * 30)  # Hz: a hundredth of a radian at the ends

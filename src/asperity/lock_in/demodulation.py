@@ -137,7 +137,13 @@ def lock_in(
     return read(blocks, refine=refine, settles=settles)
 
 
-def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> LockInReading:
+def read(
+    blocks: BlockSums,
+    *,
+    refine: bool = True,
+    settles: bool = False,
+    span: tuple[float, float] | None = None,
+) -> LockInReading:
     """The reading from the sums of load and force, in this order.
 
     Parameters
@@ -148,6 +154,8 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
         Correct the frequency to first order, from the sums.
     settles : bool
         As in `lock_in`.
+    span : (float, float), optional
+        First and last time (s) of the samples; by default those of the basis.
     """
     basis, linear = blocks.basis, blocks.basis.linear
     gram, moments = blocks.totals()
@@ -189,8 +197,9 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
         covariance[size:, size:] += settling.covariance
     omega = basis.omega + change
     return reading_of(
-        blocks, beta, omega, covariance, noise, residual, fitted=refine, settlings=settlings
-    )
+        blocks, beta, omega, covariance, noise, residual,
+        fitted=refine, settlings=settlings, span=span,
+    )  # fmt: skip
 
 
 def _on_basis(basis: Basis, beta: Float, change: float) -> Float:
@@ -278,6 +287,7 @@ class LockInStream:
         omega, degree = 2 * np.pi * frequency, DRIFTS[detrend]
         self._basis = Basis(omega, harmonics, degree, start + half, half)
         self._parts: list[BlockSums] = []
+        self._span = np.inf, -np.inf
 
     def add(self, time: Float, load: Float, force: Float) -> None:
         """Add the next samples, arrays (n,) each.
@@ -301,6 +311,7 @@ class LockInStream:
         blocks = max(1, round(BLOCKS * share))
         part = merged(sums(basis, time, [load, force], blocks=blocks, step=step), blocks)
         self._parts.append(_check_finite(part, "LockInStream.add"))
+        self._span = min(self._span[0], float(time[0])), max(self._span[1], float(time[-1]))
 
     def read(self) -> LockInReading:
         """The reading of all samples added so far.
@@ -311,7 +322,7 @@ class LockInStream:
             If there are none, or the frequency is not accurate enough.
         """
         require(self._parts, "LockInStream.add", "be called before read", "no samples", "add some")
-        reading = read(join(self._parts))
+        reading = read(join(self._parts), span=self._span)
         off = 2 * np.pi * reading.frequency - self._basis.omega
         if abs(off) * self._basis.half_width > _OFF:
             raise InputError(

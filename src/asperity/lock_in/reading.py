@@ -257,6 +257,7 @@ def reading_of(
     *,
     fitted: bool,
     settlings: tuple[Settling, ...] = (),
+    span: tuple[float, float] | None = None,
 ) -> LockInReading:
     """The reading from the coefficients of load and force.
 
@@ -274,12 +275,18 @@ def reading_of(
     fitted : bool
         Whether omega was fitted.
     settlings : tuple of Settling
+    span : (float, float), optional
+        First and last time (s) of the samples; by default those of the basis.
     """
     basis = blocks.basis
+    start, end = span or (basis.centre - basis.half_width, basis.centre + basis.half_width)
+    # Powers of the drift are those of u, from -1 to 1 over the basis.
+    low, high = ((at - basis.centre) / basis.half_width for at in (start, end))
     n, first, linear = basis.harmonics, basis.drift, basis.linear
     # Amplitudes of cos and sin are the real part and minus the imaginary one of a phasor.
     phasors = beta[first : first + n] - 1j * beta[first + n : linear]
-    average = 1 / np.arange(1, first + 1) * (np.arange(first) % 2 == 0)
+    order = np.arange(1, first + 1)
+    average = (high**order - low**order) / (order * (high - low))
     mean_load, mean_force = average @ beta[:first]
     rule = "have a mean to be relative to"
     require(mean_load, "lock_in.load", rule, "0", "give the load and not its change")
@@ -294,10 +301,10 @@ def reading_of(
         *(f"load_{part}{k}" for k in range(2, n + 1) for part in ("re", "im")),
     )
     powers = np.arange(1, first)
-    across = (1 - (-1.0) ** powers)[:, None]
+    across = (high**powers - low**powers)[:, None]
     variances = np.diagonal(covariance).clip(min=0)
     uncertainties = np.sqrt([variances[1:first], variances[linear + fitted :][1:first]]).T
-    along = np.linspace(-1, 1, _ALONG)[:, None] ** np.arange(first)
+    along = np.linspace(low, high, _ALONG)[:, None] ** np.arange(first)
     return LockInReading(
         W0=float(mean_load),
         epsilon=float(abs(relative[0, 0])),
@@ -310,12 +317,12 @@ def reading_of(
         covariance=jacobian @ covariance @ jacobian.T,
         dof=noise.dof,
         drift=(beta[1:first] * across).T,
-        drift_uncertainty=(uncertainties * across).T,
+        drift_uncertainty=(uncertainties * abs(across)).T,
         drift_range=np.ptp(along @ beta[:first], axis=0),
-        start=basis.centre - basis.half_width,
-        end=basis.centre + basis.half_width,
+        start=start,
+        end=end,
         samples=int(blocks.count.sum()),
-        phase=phase,
+        phase=phase + omega * ((start + end) / 2 - basis.centre),
         noise=noise,
         blocks=blocks,
         residual=residual,
