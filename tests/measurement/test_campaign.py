@@ -11,7 +11,7 @@ import xarray as xr
 
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
-from asperity.measurement.campaign import labelled_rows, run_campaign, sliding_rows
+from asperity.measurement.campaign import conditions_of, labelled_rows, run_campaign, sliding_rows
 from asperity.measurement.measure import measure_amplitudes
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.outputs import Interrupted
@@ -207,3 +207,22 @@ def test_the_settling_slip_of_a_table_is_a_length(pulled, sliding_trace, known) 
     assert table.settling_slip.units == "m"
     (slip,) = table.settling_slip.values
     assert 0 < slip < 6e-4 if known else np.isnan(slip)
+
+
+def test_recordings_of_one_name_do_not_share_a_row_of_conditions(tmp_path) -> None:
+    files, table = [tmp_path / day / "run.csv" for day in ("day1", "day2")], tmp_path / "rigs.csv"
+    table.write_text("file,K\nday1/run.csv,100\nday2/run.csv,300\n")
+    assert [c["stiffness"] for c in conditions_of(files, str(table)).values()] == [100, 300]
+    for name in ("day1/run.csv", "run"):
+        table.write_text(f"file,K\n{name},100\n")
+        with pytest.raises(InputError, match="must have one row for each recording, got one for"):
+            conditions_of(files, str(table))
+        assert conditions_of(files[:1], str(table)) == {files[0]: {"stiffness": 100.0}}
+
+
+def test_two_quantities_of_a_name_have_text_between_them() -> None:
+    files = [Path("k12_v3.csv")]
+    both = conditions_of(files, "k{K N/m}_v{V um/s}")
+    assert both[files[0]] == {"stiffness": "12 N/m", "velocity": "3 um/s"}
+    with pytest.raises(InputError, match="must have text between two quantities"):
+        conditions_of([Path("123.csv")], "{K N/m}{V um/s}")

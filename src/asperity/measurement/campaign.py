@@ -340,7 +340,8 @@ def conditions_of(files: Sequence[Path], text: str) -> dict[Path, dict[str, floa
     ----------
     files : sequence of Path
     text : str
-        A CSV with a column ``file``, a row a recording, and columns K, V, M or W0 in SI or with
+        A CSV with a column ``file``, a row a recording, with its folder where recordings in
+        several folders have one name, and columns K, V, M or W0 in SI or with
         the unit in the heading. Or a pattern of the files' names with quantities in braces, like
         ``run_k{K N/m}_v{V um/s}``.
 
@@ -369,6 +370,8 @@ def _of_names(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | 
         if name not in MACHINE_FIELDS or names.count(name) > 1:
             rule = f"name each of {', '.join(MACHINE_FIELDS)} once at most"
             raise InputError(Argument(_LABEL), rule, f"'{name}'", _EXAMPLE)
+    rule, got = "have text between two quantities", f"'{text}'"
+    require(all(parts[2:-1:3]), Argument(_LABEL), rule, got, _EXAMPLE)
     result: dict[Path, dict[str, float | str]] = {}
     for file in files:
         # The whole name, or all of it but the ending.
@@ -392,11 +395,20 @@ def _of_table(files: Sequence[Path], path: Path) -> dict[Path, dict[str, float |
             f"{path.name} must have the column file and some of {', '.join(MACHINE_FIELDS)}, got "
             f"{', '.join(columns) or 'none'}; add them"
         )
-    result = {}
+    result: dict[Path, dict[str, float | str]] = {}
+    owners: dict[int, Path] = {}
     for file in files:
         rows = [
             n for n, name in enumerate(columns["file"]) if Path(name).name in (file.name, file.stem)
         ]
+        # Recordings of one name in several folders have rows with their folders.
+        here = [n for n in rows if file.parent.parts[-1:] == Path(columns["file"][n]).parts[-2:-1]]
+        rows = here or rows
+        if len(rows) == 1 and owners.setdefault(rows[0], file) != file:
+            raise InputError(
+                f"{path.name} must have one row for each recording, got one for "
+                f"'{owners[rows[0]]}' and '{file}'; write the folder in the column file too"
+            )
         if len(rows) != 1:
             names = [Path(name).name for name in columns["file"]]
             advice = closest(file.name, names) if not rows else "leave one out"
