@@ -389,3 +389,10 @@ def test_between_equal_velocities_there_is_no_rate_dependence() -> None:
     ).steps
     assert np.isfinite(step.change)
     assert np.isnan([step.rate_dependence, step.rate_uncertainty, step.peak]).all()
+
+
+def test_the_mean_load_has_the_time_at_which_it_is_recorded() -> None:
+    time, slip, friction = velocity_step()
+    load = np.where(time < 60, np.nan, STRESS)
+    level = measure_sliding(recorded(time, friction=friction, slip=slip, normal_stress=load)).load
+    assert (level.value, level.start, level.end) == pytest.approx((STRESS, 60, time[-1]))

@@ -196,10 +196,10 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     checks = _checks(signals, segments, read_steps, doubts)
     about = about_channels(trace, signals.names)
     checks += findings([*about, *signals.signs], len(trace), float(time[-1] - time[0]))
-    borne = signals.load
+    borne, at = signals.load, signals.load_time
     return SlidingMeasurement(
         friction=mean_level(time, friction, recorded),
-        load=None if borne is None else mean_level(time[: borne.size], borne),
+        load=None if borne is None or at is None else mean_level(at, borne),
         load_unit=signals.load_unit,
         segments=segments,
         steps=tuple(read_steps),

@@ -53,6 +53,8 @@ class SlidingSignals:
         Metres, as recorded or as the integral of the velocity; None where neither is recorded.
     load : array, (m,), or None
         Load at the samples where it is a number, positive in compression.
+    load_time : array, (m,), or None
+        Seconds of these samples.
     load_unit : str
         SI unit of the load.
     motion : str
@@ -73,6 +75,7 @@ class SlidingSignals:
     friction: Float
     displacement: Float | None
     load: Float | None
+    load_time: Float | None
     load_unit: str
     motion: str
     no_motion: str
@@ -127,6 +130,8 @@ def sliding_signals(
             advice = "choose another column or window"
             raise InputError("measure.load", "be above zero", got, advice)
         raise too_few(_FEWEST, int(use.sum()), trace.time[~outside], used)
+    known = use if weight is None else use & np.isfinite(weight)
+    load_time = time[known]
     time, friction = time[use], friction[use]
     slip = None
     if motion is not None:
@@ -134,7 +139,7 @@ def sliding_signals(
         if is_velocity:
             slip = trapezoids(slip, time)
     if weight is not None:
-        weight = weight[use & np.isfinite(weight)]
+        weight = weight[known]
         weight = weight if weight.size else None
     optional = {"load": weight, "displacement": slip}
     present = {name: values for name, values in optional.items() if values is not None}
@@ -145,6 +150,7 @@ def sliding_signals(
         friction=-friction if turned else friction,
         displacement=slip,
         load=weight,
+        load_time=None if weight is None else load_time,
         load_unit=unit,
         motion=name,
         no_motion=no_motion,
