@@ -519,3 +519,24 @@ def test_a_stated_load_that_contradicts_the_recorded_one_is_refused() -> None:
     assert measure_stick_slip(trace, normal_load=5.2).machine.load == 5.2
     with pytest.raises(InputError, match="normal_load must agree with the recorded load, 5 N"):
         measure_stick_slip(trace, normal_load=50.0)
+
+
+@pytest.mark.parametrize("of_slider", [True, False])
+def test_the_velocity_is_that_of_whole_cycles(of_slider) -> None:
+    """A recording that ends within a stick, or before which the drive stands still."""
+    truth, load, stiffness = saw(0, events=12, noise=0.003), 5.0, 2e4
+    velocity = truth.loading_slope[0] * load / stiffness
+    drive = velocity * truth.time
+    force, moved = truth.force, drive - truth.force * load / stiffness
+    if not of_slider:
+        still = int(0.3 * force.size)
+        noise = 1e-3 * np.ptp(force) * np.random.default_rng(1).standard_normal(still)
+        force = np.concatenate([force[0] + noise, force])
+        moved = np.concatenate([np.zeros(still), drive])
+    moved = moved + 1e-9 * np.random.default_rng(2).standard_normal(moved.size)
+    trace = recorded(force)
+    channels = {**trace.channels, "x": Channel(moved, "length", "m", "displacement", "m")}
+    trace = Trace(trace.time, channels, roles={"displacement": "x"})
+    result = measure_stick_slip(trace, normal_load=load)
+    assert (result.slip_share > 0.5) == of_slider
+    assert result.machine.velocity == pytest.approx(velocity, rel=1e-3)

@@ -184,7 +184,6 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
         trace = replace(trace, channels={**trace.channels, "load": constant})
     signals = _at_even_times(sliding_signals(trace, question.load, question.force, question.window))
     time = signals.time
-    machine = _machine(question, signals)
     friction, impulses = without_impulses(signals.friction)
     noise = estimate(friction)
     falls, upside_down = find_falls(friction, noise), False
@@ -196,6 +195,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
         if upside_down:
             friction, falls = -friction, other
     events = read_events(time, friction, falls)
+    machine = _machine(question, signals, events)
     slope, slope_uncertainty = _loading(events)
     smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
     period = None
@@ -276,7 +276,7 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
     )
 
 
-def _machine(question: Question, signals: SlidingSignals) -> Machine:
+def _machine(question: Question, signals: SlidingSignals, events: SlipEvents) -> Machine:
     """The machine as stated in the question, completed from the recording."""
     load, velocity = question.normal_load, question.velocity
     if signals.load is not None and signals.load_unit == "N":
@@ -288,8 +288,10 @@ def _machine(question: Question, signals: SlidingSignals) -> Machine:
     if load is None and signals.load is None and question.mass is not None:
         load = question.mass * GRAVITY
     if velocity is None and signals.displacement is not None:
-        moved = signals.displacement
-        velocity = abs(float(moved[-1] - moved[0])) / float(signals.time[-1] - signals.time[0])
+        # Over whole cycles the slider moves as far as the drive, which may pause before or after.
+        ends = events.onset[[0, -1]] if len(events) > 1 else signals.time[[0, -1]]
+        first, last = np.interp(ends, signals.time, signals.displacement)
+        velocity = abs(float(last - first)) / float(ends[1] - ends[0])
     return Machine(question.stiffness, velocity or None, question.mass, load)
 
 
