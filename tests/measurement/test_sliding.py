@@ -396,3 +396,23 @@ def test_the_mean_load_has_the_time_at_which_it_is_recorded() -> None:
     load = np.where(time < 60, np.nan, STRESS)
     level = measure_sliding(recorded(time, friction=friction, slip=slip, normal_stress=load)).load
     assert (level.value, level.start, level.end) == pytest.approx((STRESS, 60, time[-1]))
+
+
+def test_a_hold_that_the_user_leaves_out_is_named() -> None:
+    """Its peak is the highest friction of the sliding after the hold before it."""
+    time = np.arange(0, 200, 0.02)
+    friction, slip = np.full(time.size, 0.6), np.zeros(time.size)
+    for start, length, peak in ((40, 10, 0.01), (90, 40, 0.02)):
+        since = time - start
+        slip -= 1e-5 * np.clip(since, 0, length)
+        friction -= np.where((since > 0) & (since < length), 0.005 * np.log1p(abs(since) / 0.1), 0)
+        after = since - length
+        friction += np.where(after > 0, peak * np.exp(-np.clip(after, 0, None) / 2), 0)
+    slip += 1e-5 * time
+    rng = np.random.default_rng(5)
+    trace = recorded(time, friction=friction + 1e-4 * rng.standard_normal(time.size), slip=slip)
+    for holds, named in (([(40, 50)], True), ([(40, 50), (90, 130)], False)):
+        measurement = measure_sliding(trace, holds=holds)
+        (cut,) = (check for check in measurement.checks if check.name == "segments")
+        assert ("the displacement stands still from 90 to 130 s" in cut.sentence) == named
+        assert (cut.verdict == "suspicious") == named

@@ -191,6 +191,8 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
     read_holds, turns = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
     doubts = [*cut.doubts, *unread, *turns, *_hidden_peaks(time, read_holds)]
+    if times is not None and signals.displacement is not None:
+        doubts += _other_holds(time, cut, partition(time, signals.displacement))
     if times is None and signals.displacement is None:
         doubts.append(f"velocity steps cannot be seen: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
@@ -339,6 +341,22 @@ def _hidden_peaks(time: Float, holds: list[HoldReading]) -> list[str]:
                 f"the peak after the hold at {hold.start:.6g} s may lie in a gap of {gap:.3g} s"
             )
     return doubts
+
+
+def _other_holds(time: Float, given: Partition, seen: Partition) -> list[str]:
+    """A sentence on holds of the displacement within sliding of the user, whose peaks mislead."""
+
+    def holds(cut: Partition) -> list[tuple[float, float]]:
+        edges = [float(time[0]), *(c.time for c in cut.cuts), float(time[-1])]
+        return [ends for ends, hold in zip(pairwise(edges), cut.holds, strict=True) if hold]
+
+    inner = [(a, b) for a, b in holds(seen) if time[0] < a and b < time[-1]]
+    other = [(a, b) for a, b in inner if not any(c < b and a < d for c, d in holds(given))]
+    if not other:
+        return []
+    (start, end), more = other[0], len(other) - 1
+    also = f" (and {more} more)" if more else ""
+    return [f"the displacement stands still from {start:.6g} to {end:.6g} s, no given hold{also}"]
 
 
 def _rates(time: Float) -> tuple[tuple[float, float], ...]:
