@@ -54,8 +54,8 @@ given. eps_ratio is the share of epsilon that the contacts carry.
 \b
 Holds: one slide-hold-slide test a row: hold_time, healing (static friction less
 the level of sliding), V, K over the normal load (N/m with a column W0), and
-healing_err, the standard uncertainty; without it an error common to all holds is
-estimated from the residuals. In SI, or with units in the heading: K (1/um).
+healing_err or healing_uncertainty, the standard uncertainty; without it an error
+common to all holds is estimated from the residuals. In SI, or with units in the heading: K (1/um).
 
 \b
 Recording: any file that 'asperity measure' reads, with friction (or force and

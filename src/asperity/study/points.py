@@ -146,6 +146,7 @@ class SweepOutcome(IntEnum):
     NO_RESPONSE = 63
     STOPPED = 70
     REFUSED = 71
+    NO_SAMPLES = 72
     FIT_FAILED = 80
     NO_READINGS = 81
 
@@ -179,6 +180,10 @@ _SENTENCES = {
     SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
     SweepOutcome.REFUSED: (
         "the numbers or the data of this point are invalid; the log of the run gives the reason"
+    ),
+    SweepOutcome.NO_SAMPLES: (
+        "no sample of the motion, which ends at {detail:.6g} s, lies in the time interval of a "
+        "number of transient.numbers"
     ),
     SweepOutcome.FIT_FAILED: (
         "the fit did not converge; asperity fit with the numbers of this point gives details"

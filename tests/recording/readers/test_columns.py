@@ -127,6 +127,8 @@ def test_ambiguous_columns_are_refused_until_the_user_chooses(recording):
     path = recording("time_s,Shear left (N),Shear right (N),W_N", *ROWS)
     with pytest.raises(InputError, match=r"'Shear left' or 'Shear right'; choose when reading"):
         read(path).channel("F")
+    with pytest.raises(InputError, match=r"be a column of its own, got 'Shear left', which is F"):
+        read(path, columns={"F": "Shear left", "friction": 1})
     for choice in ("Shear right", "Shear right (N)", "shear RIGHT", 2):
         trace = read(path, columns={"F": choice})
         assert trace.channel("F").recorded_name == "Shear right (N)"

@@ -118,6 +118,31 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
     assert peak[1] > peak[0]  # the lighter slider is held by the stiffer spring, K/Kc
 
 
+def test_an_interval_without_samples_has_no_number_and_a_reason(tmp_path: Path) -> None:
+    dataset = sweep(
+        tmp_path / "s.zarr",
+        solve="transient",
+        law="rice-ruina",
+        parameters={"V": 1e-6, "K": 2 * KC},
+        axes={"W0": {"values": ("7 N",)}},
+        transient={
+            "steps": ("slide for 1 s",),
+            "sampling": "20 Hz",
+            "numbers": {"late": {"of": "friction", "take": "mean", "from": "2 s"}},
+        },
+    )
+    words = dict(
+        zip(
+            dataset.outcome.flag_values,
+            dataset.outcome.flag_meanings.split(),
+            strict=True,
+        )
+    )
+    assert words[int(dataset.outcome.values[0])] == "no_samples"
+    assert dataset.detail.values == pytest.approx([1.0])
+    assert np.isnan(dataset["late"].values).all()
+
+
 def test_a_transient_follows_a_recording_next_to_its_plan(tmp_path: Path) -> None:
     """The working folder has none of that name; another recording is another plan."""
 

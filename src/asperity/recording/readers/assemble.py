@@ -8,7 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from asperity.errors import Argument, InputError, closest, known_as, listed, printable
+from asperity.errors import Argument, InputError, closest, known_as, listed, printable, require
 from asperity.parameters.arguments import shown
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
@@ -123,12 +123,17 @@ def _unique(names: list[str], findings: list[Finding]) -> list[str]:
 
 
 def _chosen_roles(columns: Mapping[str, str | int], headings: Mapping[str, str]) -> dict[str, str]:
-    roles = {}
+    roles: dict[str, str] = {}
     for key, wanted in columns.items():
         role = role_of(key)
         if role is None:
             raise InputError("columns", "name roles", f"'{key}'", closest(key, ROLES))
-        roles[role] = _name_of(wanted, headings, Argument("columns", key))
+        field = Argument("columns", key)
+        name = _name_of(wanted, headings, field)
+        other = next((known for known, taken in roles.items() if taken == name), None)
+        got, advice = f"'{name}', which is {other} too", "choose another column for one of them"
+        require(other is None, field, "be a column of its own", got, advice)
+        roles[role] = name
     return roles
 
 

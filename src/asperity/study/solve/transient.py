@@ -112,21 +112,25 @@ class TransientSolve(SolveKind):
             if trajectory.termination is not None:
                 answers.fail(k, SweepOutcome.STOPPED, trajectory.termination.time)
                 continue
-            for name, entry in settings["numbers"].items():
-                answers.numbers[name][k] = _statistic(trajectory, entry)
+            numbers = {n: _statistic(trajectory, e) for n, e in settings["numbers"].items()}
+            if None in numbers.values():
+                answers.fail(k, SweepOutcome.NO_SAMPLES, trajectory.time[-1])
+                continue
+            for name, value in numbers.items():
+                answers.numbers[name][k] = value
             answers.outcome[k] = SweepOutcome.CONVERGED
         return answers
 
 
-def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
-    """A number of a trajectory; NaN if no sample lies in the time interval of the entry."""
+def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float | None:
+    """A number of a trajectory; None if no sample lies in the time interval of the entry."""
     channel = np.asarray(getattr(trajectory, entry["of"]))
     inside = np.ones(len(channel), dtype=bool)
     if entry["from"] is not None:
         inside &= trajectory.time >= entry["from"]
     if entry["to"] is not None:
         inside &= trajectory.time <= entry["to"]
-    return TAKEN[entry["take"]](channel[inside]) if inside.any() else float("nan")
+    return TAKEN[entry["take"]](channel[inside]) if inside.any() else None
 
 
 def _planned(lines: Iterable[str], values: Mapping[str, float], folder: Path) -> list[Any]:
