@@ -67,9 +67,9 @@ def test_an_orbit_at_the_end_of_a_canard_obeys_the_equations(solve, reference):
     assert (error <= 1e-6 * np.abs(shot.harmonics)).all()
 
 
-# `orbit/test_periodic.py` has another runaway, and `orbit/test_search.py` what the last one, which
-# takes a minute, is called.
-@pytest.mark.parametrize("name", population(list(CORNER)[1:]))
+# `orbit/test_periodic.py` has another runaway, the last test of this file a fold, and
+# `orbit/test_search.py` what the last one, which takes a minute, is called.
+@pytest.mark.parametrize("name", population(list(CORNER)[1:], short=0))
 def test_a_branch_that_does_not_arrive_has_a_reason(solve, name):
     _, _, epsilon, response = solve(name)
     assert response.outcome[0] == CORNER[name][-1]

@@ -47,7 +47,7 @@ def of_scipy(name, A, B, D0, K, M, W0, V, cycles, options):
     return t[last] - t[first], F[last], F[low], t[last] - t[low], fastest, np.diff(F[tops[-4:]])
 
 
-@pytest.mark.parametrize("name", population(list(STATE_RATES), short=2))
+@pytest.mark.parametrize("name", population(list(STATE_RATES)))
 @draws(1, 4)
 def test_cycles_are_those_of_scipy(name, draws):
     draw = np.random.default_rng(len(name))

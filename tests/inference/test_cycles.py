@@ -21,6 +21,7 @@ from asperity.measurement.from_file import reads_cycles
 from asperity.questions.fit import Fit
 from asperity.questions.recording import Measurement as Question
 from asperity.transients.limit_cycle import limit_cycle
+from references.populations import draws
 
 W0, V, RATE, CYCLES = 1.0, 1e-4, 200.0, 40
 LAW = {"A": 0.01, "B": 0.015, "D0": 1e-6}
@@ -47,11 +48,12 @@ def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
     return asp.measure(trace, stick_slip=True, **{"velocity": V, "normal_load": W0} | machine)
 
 
-def test_residuals_at_the_truth_are_chi_squared():
+@draws(1, 3)
+def test_residuals_at_the_truth_are_chi_squared(draws):
     """Sums over recordings, of noise that is 2 % of the drop, and of cycles that are unlike too."""
     for spread in (0.0, 0.03):
         total, count = 0.0, 0
-        for seed in range(3):
+        for seed in range(draws):
             term = CycleTerm(averaged_cycle(measured(seed, spread=spread)), RiceRuina, FIXED)
             residuals = term.residuals(TRUTH).values
             total, count = total + float(residuals @ residuals), count + residuals.size

@@ -184,7 +184,7 @@ def test_a_real_recording_of_paper_on_paper() -> None:
     assert (events.drop > falls.thresholds.min()).all()
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.8])
+@pytest.mark.parametrize("correlation", population([0.8, 0.0]))
 def test_errors_of_onsets_agree_with_their_uncertainties(correlation) -> None:
     # In long slips a bin of the search has twelve samples, and onsets are known to less than one.
     # The error by the shape is common to all slips of a recording: several recordings are needed.

@@ -91,7 +91,7 @@ def test_a_friction_that_no_contact_has_is_named(readings, pmma):
         readings_of_mean = table_of({**columns, "mean_friction_err": factor * error})
         free = ["mu0", "A", "B"]
         others = {n: v for n, v in fixed.items() if n not in free}
-        options = {"fixed": others, "check_stiffness": False}
+        options = {"fixed": others, "check_stiffness": False, "starts": 8}
         result = fit(readings_of_mean, "elasto-plastic", free, **options)
         assert sum("mu0 of" in w and "check the units" in w for w in result.warnings) == named
 

@@ -294,6 +294,7 @@ def test_large_spikes_are_not_reported_as_jumps_too():
     assert clean_run.jumps == ()
 
 
+@pytest.mark.long
 def test_a_spike_as_small_as_changes_of_friction_is_left_out_by_the_fit():
     """The spike is where the reloading after a hold ends; the data alone do not show it."""
     case = CASES["holds"]

@@ -100,7 +100,7 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
 def test_readings_drawn_at_true_values_scatter_as_the_standard_errors_say(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", 0)
     # Readings without what the rows say of them, but with their uncertainties.
-    seeds, true = 40, 0.02
+    seeds, true = 16, 0.02
 
     def drawn(A: float, count: int) -> xr.Dataset:
         out = tmp_path / f"{A}.zarr"

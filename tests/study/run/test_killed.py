@@ -84,6 +84,7 @@ def _runs(process: int) -> bool:
     return True
 
 
+@pytest.mark.long  # `test_engine.py` kills one of two workers of a cluster
 @pytest.mark.skipif(os.name != "posix", reason="no SIGKILL")
 def test_one_of_two_workers_is_killed(tmp_path: Path, whole: dict[str, bytes]) -> None:
     out, mark = tmp_path / "s.zarr", tmp_path / "killed"
