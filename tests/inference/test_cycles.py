@@ -73,10 +73,8 @@ def test_a_recording_in_memory_is_fitted_as_its_file_is():
     with pytest.raises(InputError, match=r"have W0 .* as fixed=\{'W0': '0\.3 N'\}"):
         asp.fit(recorded(1), free=["K"], fixed=fixed)
     fixed |= {"W0": W0, "M": MACHINE["M"]}
-    fitted = asp.fit(recorded(1), free=["K"], fixed=fixed).parameters["K"]
+    fitted = asp.fit(recorded(1), free=["K"], fixed=fixed, starts=2).parameters["K"]
     assert fitted.value == pytest.approx(MACHINE["K"], abs=4 * fitted.se)
-    with pytest.raises(InputError, match="a load that is modulated at 120 Hz"):
-        asp.fit(asp.samples.modulated())
 
 
 def test_a_force_alone_is_measured_once(monkeypatch):
@@ -135,6 +133,8 @@ def test_a_modulated_recording_is_no_stick_slip(tmp_path):
     np.savetxt(tmp_path / "a.csv", columns, "%.8g", ",", header=head, comments="")
     with pytest.raises(InputError, match="modulated at 100 Hz; read its harmonics first"):
         read_data(Fit(data=[{"file": tmp_path / "a.csv"}]))
+    with pytest.raises(InputError, match="a load that is modulated at 100 Hz"):
+        asp.fit(asp.read(tmp_path / "a.csv"))
 
 
 def test_derivatives_are_those_of_the_residuals():

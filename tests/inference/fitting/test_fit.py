@@ -197,6 +197,8 @@ def test_a_wrong_law_is_excluded_by_a_named_observable(readings, pmma):
         ["rice-ruina", "elasto-plastic"],
         ["lambda", "eps_ratio", "A"],
         material=pmma,
+        evidence=False,
+        starts=4,
     )
     assert comparison.decided
     assert comparison.best == "elasto-plastic"
