@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import fsolve
 
 import asperity as asp
+from asperity.branches.parameters import one_problem
 from asperity.errors import InputError
 from references.populations import population
 
@@ -208,3 +209,15 @@ def test_bad_input_is_one_sentence(rapid, change, message):
     with pytest.raises(InputError, match=message) as caught:
         asp.continuation(rapid.slider, **(good | change))
     assert "\n" not in str(caught.value)
+
+
+def test_the_equations_are_those_of_the_asperities_on_the_branch(rapid):
+    """A slider on rigid asperities kept its equations, in which lambda has no effect."""
+    rigid = asp.laws.ElastoPlastic(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6, lambda_=0.0)
+    slider = asp.Slider(rigid, spring=4e5, load=7.0, mass=1.6)
+    point = {"velocity": 1e-6, "epsilon": 0.05, "frequency": 120.0, "inertia": True}
+    ask = {"slider": slider, "modulation": None, "radiation_damping": None, **point}
+    motion = one_problem(ask, {"lambda": (1e-7, 1e-6)}).system
+    assert motion.mechanical == ("force", "velocity", "friction")
+    with pytest.raises(InputError, match="span must be positive for lambda, got 0 m"):
+        asp.continuation(slider, parameter="lambda", span=(0, 1e-6), **point)

@@ -17,8 +17,14 @@ from asperity.laws import Law
 from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number
-from asperity.slider import Slider
-from asperity.slider.parameters import equation_parameters, equation_values, with_value
+from asperity.slider import QuasiStatic, Slider
+from asperity.slider.parameters import (
+    equation_parameters,
+    equation_values,
+    slider_from,
+    slider_values,
+    with_value,
+)
 from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
@@ -69,7 +75,10 @@ def moving_parameter(
         rule = "be one that the equations have"
         raise InputError("parameter", rule, f"'{name}'", closest(name, known))
     parameter = known[name]
-    start, end = (_end(parameter, end, field) for end in span)
+    # With inertia or damping rigid asperities have other equations than elastic ones.
+    one_equation = isinstance(problem.system, QuasiStatic)
+    positive = name in ("M", "eta") or (name == "lambda" and not one_equation)
+    start, end = (_end(parameter, end, field, positive) for end in span)
     require(start != end, field, "have two different ends", f"{start:g} twice", "give (start, end)")
     ratio = max(start, end) / min(start, end) if min(start, end) > 0 else 0.0
     return ContinuedParameter(
@@ -120,11 +129,11 @@ def line_through(
     return ParameterLine(origin, added, growth)
 
 
-def _end(parameter: Parameter, value: Any, field: str) -> float:
+def _end(parameter: Parameter, value: Any, field: str, positive: bool) -> float:
     """An end of a span, checked by the rule of the parameter."""
     checked = number(value, field, parameter.kind, parameter.rule)
     # 0 in a table means "not included"; a continued parameter must be part of the equations.
-    holds, got = parameter.name not in ("M", "eta") or checked > 0, f"{checked:g} {parameter.unit}"
+    holds, got = not positive or checked > 0, f"{checked:g} {parameter.unit}"
     require(holds, field, f"be positive for {parameter.name}", got, "give a span above zero")
     return checked
 
@@ -137,8 +146,8 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     arguments : dict
         Arguments of `continuation`; further ones are ignored.
     spans : dict
-        Spans by the name of the parameter; a continued velocity, epsilon, frequency or damping has
-        the value at the start of its span.
+        Spans by the name of the parameter; a continued velocity, epsilon, frequency, damping, mass
+        or elastic length has the value at the start of its span.
 
     Raises
     ------
@@ -147,14 +156,19 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
         name.
     """
     slider: Slider = arguments["slider"]
+    law = type(slider.law)
     point = {name: arguments[name] for name in _POINT}
-    moving = {continued_name(type(slider.law), name): span[0] for name, span in spans.items()}
+    moving = {continued_name(law, name): span[0] for name, span in spans.items()}
+    # The equations of motion follow from these two.
+    starts = {name: moving[name] for name in ("lambda", "M") if name in moving}
+    if starts:
+        slider = slider_from(law, slider_values(slider) | starts)
     for name, symbol in (("velocity", "V"), ("frequency", "frequency")):
         point[name] = moving.get(symbol, point[name])
         if point[name] is None:
             raise InputError(name, "be given", "None", "or continue in it")
-    rule, got = "depend on the velocity to have a branch with bifurcations", slider.law.name
-    require(slider.law.rate_dependent, "law", rule, got, "its force is mu W for all parameters")
+    rule, got = "depend on the velocity to have a branch with bifurcations", law.name
+    require(law.rate_dependent, "law", rule, got, "its force is mu W for all parameters")
     if point["modulation"] is None:
         point["epsilon"] = moving.get("epsilon", point["epsilon"])
     point["radiation_damping"] = moving.get("eta", point["radiation_damping"])
