@@ -7,6 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from asperity import Slider, laws, periodic_response
 from asperity.errors import InputError
+from asperity.experiment import hold_response, stick_slip_response
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme, Slide, StepLoad
 from asperity.protocol import Protocol, ProtocolError
@@ -111,9 +112,15 @@ def test_a_wrong_track_is_refused(track, message) -> None:
     assert message in str(raised.value)
 
 
-def test_a_periodic_response_on_an_uneven_track_is_refused() -> None:
-    slider = Slider(on_uneven_track(LAW, amplitude=0.01, length=1e-5), spring=K, load=W0)
-    with pytest.raises(InputError, match="integrate it as a transient"):
-        periodic_response(slider, velocity=V, epsilon=0.1, frequency=120.0)
+def test_what_needs_steady_sliding_refuses_an_uneven_track() -> None:
+    """Limit cycles called steady sliding unstable for any spring, as the position never relaxes."""
+    slider = Slider(on_uneven_track(LAW, amplitude=0.01, length=1e-5), spring=K, load=W0, mass=M)
+    for question in (
+        lambda: periodic_response(slider, velocity=V, epsilon=0.1, frequency=120.0),
+        lambda: stick_slip_response(slider, velocity=V),
+        lambda: hold_response(slider, velocity=V, hold_time=10.0),
+    ):
+        with pytest.raises(InputError, match="integrate it as a transient"):
+            question()
     with pytest.raises(InputError, match="the same everywhere"):
         on_uneven_track(slider.law, amplitude=0.01, length=1e-5)

@@ -21,7 +21,7 @@ from asperity.laws import Law
 from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
 from asperity.slider import QuasiStatic, Slider
-from asperity.slider.problem import flatten
+from asperity.slider.problem import flatten, require_even_track
 from asperity.theory.memory import steady_growth
 from asperity.transients.batch import End
 from asperity.transients.hold_and_step import (
@@ -320,6 +320,7 @@ def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
         raise InputError("stiffness", "be left out with a slider", "both", advice)
     law, advice = slider.law, "it has no memory to test"
     require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
+    require_even_track(law, "a hold or a velocity step")
     return slider
 
 

@@ -16,7 +16,7 @@ from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn
 from asperity.slider import Slider, equation_of_motion
-from asperity.slider.problem import flatten
+from asperity.slider.problem import flatten, require_even_track
 from asperity.theory.memory import steady_growth
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
@@ -110,7 +110,7 @@ def stick_slip_response(
     Raises
     ------
     InputError
-        If a value breaks its rule, or the law does not depend on velocity.
+        If a value breaks its rule, or the law does not depend on velocity or varies along a track.
 
     Notes
     -----
@@ -123,6 +123,7 @@ def stick_slip_response(
     law = slider.law
     advice = "asperity.theory has the cycle of constant static and dynamic friction"
     require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
+    require_even_track(law, "a limit cycle")
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
     if spring is not None:
         stiffness: Any = spring

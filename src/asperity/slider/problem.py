@@ -14,6 +14,7 @@ from jax.typing import ArrayLike
 
 from asperity.arrays import Float
 from asperity.errors import InputError, require
+from asperity.laws import Law
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
@@ -97,6 +98,13 @@ def _elastic(slider: Slider) -> bool:
     return bool(np.all(length > 0))
 
 
+def require_even_track(law: Law, motion: str) -> None:
+    """Refuse a law whose mu0 varies along the track: it has no steady sliding and no period."""
+    rule, got = f"be the same everywhere for {motion}", "one on an uneven track"
+    holds = POSITION not in law.state_names
+    require(holds, "slider.law", rule, got, "integrate it as a transient")
+
+
 class Problem(NamedTuple):
     """Equations and load of many operating points, parameters along the last axis."""
 
@@ -121,9 +129,7 @@ def checked_problem(
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
-    rule, got = "be the same everywhere for a periodic response", "one on an uneven track"
-    advice = "integrate it as a transient"
-    require(POSITION not in slider.law.state_names, "slider.law", rule, got, advice)
+    require_even_track(slider.law, "a periodic response")
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)
