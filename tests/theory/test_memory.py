@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from asperity.errors import InputError
-from asperity.laws import ElastoPlastic, ElastoPlasticAge, TwoState, registered
+from asperity.laws import ElastoPlastic, ElastoPlasticAge, PrakashClifton, TwoState, registered
 from asperity.theory import closed_forms, healing_drop, memory, overshooting_cycle
 from references.memory_tests import STATE_RATES, Interface
 
@@ -46,6 +46,9 @@ def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
     # Two states of one length are one state of B + B2.
     same = TwoState(**(NUMBERS | {"B": 0.005}), B2=0.004, D2=D0)
     assert memory.critical_stiffness(same, V0) == pytest.approx((B - A) / D0, rel=1e-8)
+    # A load memory that relaxes in time, 1e11 times faster than the age: it has no effect.
+    loaded = PrakashClifton(**NUMBERS, L=1e-7, V_star=1e-2)
+    assert memory.critical_stiffness(loaded, 3e-12) == pytest.approx((B - A) / D0, rel=1e-8)
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])

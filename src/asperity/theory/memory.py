@@ -35,7 +35,8 @@ from asperity.parameters import obeying
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, QuasiStatic, Slider
 
-#: Stiffnesses of the stability scan, over the scale of the law: decades and number of points.
+#: Stiffnesses of the stability scan: decades below and above those at which the spring is as fast
+#: as the slowest and the fastest state, and number of points.
 _DECADES, _POINTS = 8, 400
 _REFINEMENTS = 8
 _DECADE = math.log(10)
@@ -91,10 +92,10 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
         (jnp.log(jnp.asarray(V)),),
         (jnp.ones(()),),
     )
-    scale = float(direct) * float(rates.max(initial=0.0))
+    scales = float(direct) * rates[rates > 0]
     rule = "have a state that relaxes and a direct effect"
-    require(scale > 0, "law", rule, law.name, "its sliding has no critical stiffness")
-    k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
+    require(np.any(scales > 0), "law", rule, law.name, "its sliding has no critical stiffness")
+    k = np.geomspace(scales.min() / 10**_DECADES, scales.max() * 10**_DECADES, _POINTS)
     low = 0.0
     for refinement in range(_REFINEMENTS):
         unstable = np.flatnonzero(_growth(law, V, k) > 0)
