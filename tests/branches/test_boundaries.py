@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.branches import stability
 from asperity.branches.stability import BoundaryHalf
 from asperity.errors import InputError
 
@@ -55,6 +56,7 @@ def test_without_modulation_the_boundary_is_at_the_critical_stiffness(stiffness,
 
 def test_modulation_stabilises_softer_springs(stiffness):
     (curve,) = stiffness.curves
+    assert stiffness.unsearched == ()
     order = np.argsort(curve.x)
     assert (np.diff(curve.y[order]) < 0).all()
     assert curve.bounds_stability.all()
@@ -117,6 +119,19 @@ def test_a_dataset_of_curves_has_units(stiffness):
     assert data.y.attrs["units"] == "N/m"
     assert data.y.attrs["long_name"] == "K"
     assert set(data.kind.values) == {"Neimark-Sacker"}
+
+
+def test_lines_that_are_not_followed_to_their_ends_are_named(slow, monkeypatch):
+    """Boundaries on the rest of such a line were missed without a word."""
+    plane = {"x": "epsilon", "y": "K", "x_span": (0, 0.01), "y_span": (4e5, 5e5)}
+    at = {"velocity": slow.V, "frequency": slow.frequency, "lines": 2}
+    monkeypatch.setattr(stability.BranchFollower, "begin", lambda self: None)
+    none = asp.stability_boundary(slow.slider, **plane, **at)
+    lines = [f"K beyond 4e+05 N/m at epsilon = {e}" for e in (0, 0.01)]
+    lines += [f"epsilon beyond 0 at K = {K} N/m" for K in ("4e+05", "5e+05")]
+    assert none.unsearched == tuple(lines)
+    assert none.to_dataset().attrs["unsearched"] == "; ".join(lines)
+    assert f"not searched={lines[0]}" in repr(none)
 
 
 def test_equal_parameters_are_refused(slow):

@@ -317,6 +317,9 @@ class StabilityBoundary(Displayed):
     ----------
     names, units : tuple of two str
     curves : tuple of BoundaryCurve
+    unsearched : tuple of str
+        Parts of the lines of the search that could not be followed, as sentences: a curve that
+        meets no other part is missed.
     motion : Motion
     fixed : dict
         The other parameters of the operating point, SI.
@@ -325,17 +328,19 @@ class StabilityBoundary(Displayed):
     names: tuple[str, str]
     units: tuple[str, str]
     curves: tuple[BoundaryCurve, ...]
+    unsearched: tuple[str, ...]
     motion: Motion
     fixed: dict[str, float]
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """The plane, and a line for each curve."""
+        """The plane, and a line for each curve and for each part that was not searched."""
         law = self.motion.slider.law.name
         lines = []
         for curve in self.curves:
             spans = zip(self.names, (curve.x, curve.y), strict=True)
             where = ", ".join(f"{name} {number_line(name, v).value}" for name, v in spans)
             lines.append(SummaryLine(curve.kind, where, count_text(len(curve.x), "point")))
+        lines += [SummaryLine("not searched", line) for line in self.unsearched]
         return f"StabilityBoundary, {law}, {' and '.join(self.names)}", lines
 
     def to_dataset(self) -> xarray.Dataset:
@@ -358,7 +363,8 @@ class StabilityBoundary(Displayed):
         kinds = [np.full(len(c.x), c.kind) for c in curves]
         data["curve"] = joined(numbers, "", "number of the curve")
         data["kind"] = joined(kinds, "", "kind of the bifurcation")
-        return xarray.Dataset(data, attrs=equations_as_text(self.motion, self.fixed))
+        missed = {"unsearched": "; ".join(self.unsearched)}
+        return xarray.Dataset(data, attrs=equations_as_text(self.motion, self.fixed) | missed)
 
 
 @typed
@@ -434,8 +440,15 @@ def stability_boundary(
     plane = ParameterPlane(problem, parameters)
     report = counted(progress, 2 * lines)
     curves: list[TracedBoundary] = []
+    unsearched = []
     for at, direction in _scan_lines(lines):
-        for kind, crossing in _crossings(plane, at, direction):
+        crossings, reached = _crossings(plane, at, direction)
+        if reached < 1:
+            moving, fixed = parameters[:: -1 if direction[1] else 1]
+            last, there = moving.value(reached), fixed.value(at.max())
+            rest = f"{moving.name} beyond {last:.4g} {moving.unit}".rstrip()
+            unsearched.append(f"{rest} at {fixed.name} = {there:.4g} {fixed.unit}".rstrip())
+        for kind, crossing in crossings:
             if not any(_lies_on(curve, kind, crossing) for curve in curves):
                 curves.append(trace_boundary(plane, kind, crossing, partial(report, 0)))
         report(1)
@@ -443,6 +456,7 @@ def stability_boundary(
         (parameters[0].name, parameters[1].name),
         (parameters[0].unit, parameters[1].unit),
         tuple(_boundary_curve(plane, curve) for curve in curves),
+        tuple(unsearched),
         problem.system,
         fixed_parameters(problem, *(p.name for p in parameters)),
     )
@@ -459,19 +473,20 @@ def _scan_lines(lines: int) -> list[tuple[Float, Float]]:
 
 def _crossings(
     plane: ParameterPlane, at: Float, direction: Float
-) -> list[tuple[Any, BoundaryPoint]]:
-    """Bifurcations on a line; an empty list if there is no orbit at its start."""
+) -> tuple[list[tuple[Any, BoundaryPoint]], float]:
+    """Bifurcations on a line, and the share of it that could be followed."""
     follower = plane.follower(at, direction)
     start = follower.begin()
     if start is None:
-        return []
+        return [], 0.0
     branch = ParameterBranch(follower, start, _SCAN_STEPS)
     branch.follow()
-    return [
+    crossings = [
         (b.kind, BoundaryPoint(at + b.branch_orbit.t * direction, b.branch_orbit))
         for b, _ in branch.bifurcations
         if b.kind != "branch point"
     ]
+    return crossings, max(orbit.t for orbit in branch.orbits)
 
 
 def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:
