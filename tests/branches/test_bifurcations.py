@@ -94,6 +94,9 @@ def test_the_doubled_branch_obeys_the_equations(hysteresis, resonance):
     branch = asp.doubled_branch(hysteresis, doubling)
     assert branch.completed
     assert branch.stable.all()  # a supercritical doubling of a stable orbit
+    # In its file the n-th harmonic is that of n f/2, and mu1 that of f.
+    assert "Re(c_n e^{i n w t / periods})" in branch.provenance["convention"]
+    np.testing.assert_array_equal(branch.to_dataset().mu1, abs(branch.harmonics[:, 1]))
     # The subharmonic grows as a pitchfork: with the root of the distance.
     distance = branch.parameter - doubling.value
     near = np.argmin(np.abs(distance - 1e-4))
@@ -184,6 +187,7 @@ def test_a_dataset_has_units_and_provenance(hysteresis, tmp_path):
     data = hysteresis.to_dataset()
     assert all({"units", "long_name"} <= set(v.attrs) for v in data.variables.values())
     assert data.attrs["continued_parameter"] == "epsilon"
+    assert data.attrs["modulation"] == "w(t) = 1 + eps cos(w t)"
     assert "V = 1e-06 m/s" in data.attrs["parameters"]
     assert list(data.bifurcation_kind.values) == kinds(hysteresis)
     data.to_netcdf(tmp_path / "branch.nc")

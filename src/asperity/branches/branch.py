@@ -208,8 +208,8 @@ class Branch(Displayed):
         points = {
             "parameter": (self.unit, self.name),
             "mean_friction": ("", "mean of F/W0"),
-            "mu1": ("", "first harmonic of F/W0, peak"),
-            "mu2": ("", "second harmonic of F/W0, peak"),
+            "mu1": ("", "amplitude of F/W0 at the frequency of the modulation, peak"),
+            "mu2": ("", "amplitude of F/W0 at twice the frequency of the modulation, peak"),
             "stable": ("", "whether all multipliers are inside the unit circle"),
         }
         data = {n: variable(("point",), getattr(self, n), *about) for n, about in points.items()}
@@ -230,11 +230,13 @@ class Branch(Displayed):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Version, law, equation of motion, fixed parameters, and why the branch ends."""
+        """Version, law, equation of motion, load, fixed parameters, and why the branch ends."""
         return {
             **equations_as_text(self.motion, self.fixed),
             "continued_parameter": self.name,
             "periods": self.periods,
             "result": self.result,
-            "convention": "F/W0 = mean + sum mu_n cos(n w t / periods + phase_n)",
+            "modulation": self.origin.problem.load.formula,
+            "convention": "F/W0 = mean + sum Re(c_n e^{i n w t / periods}), c_n in harmonics_real "
+            "and harmonics_imag; mu1 and mu2 are the amplitudes at w and 2 w",
         }
