@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity import materials
+from asperity.errors import InputError
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales, stiffness_threshold
 
@@ -53,6 +54,13 @@ def test_where_there_is_no_threshold_the_result_says_on_which_side() -> None:
     assert "stable at every stiffness" in below.result[()]
     assert f"from {1.2 * KC:.4g} N/m; extend between" in below.result[()]
     assert f"unstable at the stiffest spring of the scan, {0.6 * KC:.4g} N/m" in above.result[()]
+
+
+def test_inertia_without_a_mass_is_refused() -> None:
+    """The result was that no stiffness has a periodic response."""
+    slider = asp.Slider(PMMA.law("rice-ruina"), spring=PMMA.K, load=PMMA.W0)
+    with pytest.raises(InputError, match="mass must be positive, got 0 kg"):
+        stiffness_threshold(slider, velocity=1e-6, epsilon=0.1, frequency=120.0, inertia=True)
 
 
 def monodromy(rates, start, period: float, step: float = 1e-6) -> np.ndarray:

@@ -19,7 +19,7 @@ from asperity.laws import Law
 from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
 from asperity.parameters.arguments import at_least, broadcast_shape, number, typed
-from asperity.slider import Slider
+from asperity.slider import Slider, equation_of_motion
 from asperity.slider.parameters import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
 from asperity.study.points import POINT_BYTES, Answers, SweepOutcome
@@ -123,7 +123,8 @@ def stiffness_threshold(
     Raises
     ------
     InputError
-        If a number breaks its rule, or the law has no K_c and `between` is not given.
+        If a number breaks its rule, or the law has no K_c and `between` is not given; as
+        `asperity.slider.equation_of_motion`.
 
     Examples
     --------
@@ -142,12 +143,12 @@ def stiffness_threshold(
             raise
         critical = np.nan
     low, high = _ends(critical, between)
+    V = number(velocity, "velocity", "velocity", "positive")
     eta = 0.0 if radiation_damping is None else radiation_damping
-    values = _numbers(slider) | {
-        "V": number(velocity, "velocity", "velocity", "positive"),
-        "eta": number(eta, "radiation_damping", "damping", "not negative"),
-        "inertia": float(inertia),
-    }
+    eta = number(eta, "radiation_damping", "damping", "not negative")
+    # The equations refuse inertia without a mass.
+    equation_of_motion(slider, V, 1.0, inertia=inertia, eta=eta or None)
+    values = _numbers(slider) | {"V": V, "eta": eta, "inertia": float(inertia)}
     count = eps.size
     require_scan(count, scan, "scan")
     searched = search_thresholds(
