@@ -386,6 +386,10 @@ def test_healing_is_fitted_to_recordings_at_several_velocities() -> None:
     assert result.interval_95[0] < 2 * B < result.interval_95[1]
     # The uncertainty follows from the scatter of the drops, ten times what is stated for each.
     assert result.drop_uncertainty > 4e-4 / (np.std(np.log(stick)) * np.sqrt(V.size))
+    # Limit cycles of K = Kc/2, M V^2 = A D0 W0, B = 2 A, and of K = Kc/20, B = 1.3 A.
+    for factor in (1.275, 2.539):
+        low, high = of_campaign(stick, 0.1 + factor * 0.01 * np.log(stick), 1e-6 + 0 * V).b_minus_a
+        assert low < 0.01 < high
     assert "e-folds" in of_campaign(stick[:3] ** 0.01, drop[:3], np.full(3, 1e-4)).reason
     assert "too few" in of_campaign(stick[:2], drop[:2], np.full(2, 1e-4)).reason
 

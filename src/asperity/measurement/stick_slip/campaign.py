@@ -78,16 +78,19 @@ class StickSlipSeries:
     def b_minus_a(self, healing: StickSlipHealing) -> tuple[tuple[float, float], str]:
         """95 % interval of B - A, and the condition on which it holds, or why it does not.
 
-        The factors between growth and B - A are those of M V^2 < A D0 W0, at the fastest recording,
-        and K < (B - A) W0/(2 D0): together A > 2 K M V^2/((B - A) W0^2), which is no friction where
-        it exceeds the peak force. A slip that damping stops without an overshoot drops by half.
+        The factors between growth and B - A are those of B > 1.3 A, of M V^2 < A D0 W0, at the
+        fastest recording, and of K < (B - A) W0/(2 D0). The last two give
+        A > 2 K M V^2/((B - A) W0^2), which is no friction where it exceeds the peak force. A slip
+        that damping stops without an overshoot drops by half; Ruina's slip law has factors down
+        to 1.
         """
         none = float("nan"), float("nan")
         if healing.reason:
             return none, healing.reason
         condition = (
-            f"where the law alone damps slips ({symbol('B - A')} is up to twice as large where the "
-            f"machine stops them), {symbol('K')} is below half of the critical stiffness and "
+            f"of the ageing law, where it alone damps slips ({symbol('B - A')} is up to twice as "
+            f"large where the machine stops them), {symbol('B')} is above 1.3 {symbol('A')}, "
+            f"{symbol('K')} is below half of the critical stiffness and "
         )
         energy = self.mass(np.nan) * float(np.nanmax(self.column("V"), initial=-np.inf)) ** 2
         if not np.isfinite(energy * self.W0):

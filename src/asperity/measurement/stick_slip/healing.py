@@ -17,10 +17,11 @@ from asperity.measurement.series import weighted_line
 
 #: Fewest recordings for a slope, and most iterations for their scatter about it.
 _FEWEST, _PASSES = 3, 30
-#: Growth of the drop per e-fold of stick time over B - A: limit cycles of 24 sliders with inertia
-#: and random A, B, D0, M and V of the Rice-Ruina law, at stiffnesses from 0.05 to 0.5 of the
-#: critical one and M V^2 < A D0 W0; less where the drive is faster or the spring stiffer.
-FACTOR = 1.8, 2.4
+#: Growth of the drop per e-fold of stick time over B - A: limit cycles of the Rice-Ruina law with
+#: inertia at stiffnesses below 0.5 of the critical one, M V^2 < A D0 W0 and B - A above 0.3 A have
+#: 1.27 to 2.54. It is less where the drive is faster or the spring stiffer, and more where B is
+#: nearer to A.
+FACTOR = 1.2, 2.6
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class StickSlipHealing:
         Of F/W for a factor e of stick time, and its standard uncertainty; NaN with too few
         recordings. With a strength that depends on the stick time alone 2 B where a slip overshoots
         and B where it does not; of a rate-and-state law, as the velocity changes the stick time,
-        1.8 to 2.4 times B - A for stiffnesses up to half of the critical one, and less above.
+        `FACTOR` times B - A for stiffnesses up to half of the critical one, and less above.
     interval_95 : (float, float)
     recordings : int
     reason : str
