@@ -23,6 +23,7 @@ from asperity.loads import (
 )
 from asperity.recording.readers import read
 from asperity.transients import Trajectory, transient
+from asperity.transients.inputs import first_checkpoint
 from references.populations import population
 
 START = {"load": "7 N", "velocity": "1 um/s"}
@@ -199,6 +200,17 @@ def test_every_law_relaxes_to_steady_sliding_under_another_load(name) -> None:
     x = programme.position(8.0) - (motion.force[-1] - 7 * float(law.mu_ss(1e-6))) / 1.5e6
     assert motion.displacement[-1] == pytest.approx(x, rel=1e-6)
     np.testing.assert_allclose(motion.states[-1, 1:], again.states[0, 1:], rtol=1e-4, atol=1e-4)
+
+
+def test_steady_sliding_under_a_load_far_from_that_of_the_slider_is_steady() -> None:
+    law = asp.laws.Nagata(**(COMMON | {"A": 0.013, "B": 0.01}), c=2.0)
+    motion = asp.slider.equation_of_motion(asp.Slider(law, spring=2e6, load=7.0), 1e-6, 1.0)
+    first = first_checkpoint(
+        motion, Programme(Slide("1 s"), load="42 N", velocity="1 um/s"), "steady"
+    )
+    # c F_i / (B W0) is 600: as many Newton steps of the logarithm of the age.
+    np.testing.assert_allclose(first.states[0], 6 * 0.5, rtol=1e-12)
+    np.testing.assert_allclose(first.states[1], 2 / 0.01 * 6 * 0.5, rtol=1e-12)
 
 
 def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:

@@ -21,8 +21,10 @@ from asperity.transients.equations import SegmentEquations, Tolerances, states_a
 from asperity.transients.events import EventThresholds
 from asperity.transients.integration import NO_LOAD, Checkpoint, Integration
 
-#: Number and largest length of the Newton steps for the states of the law under another load.
-_STEPS, _LEAP = 30, 2.0
+#: Largest number and length of the Newton steps for the states of the law under another load, and
+#: the change below which they end: from an age that is too small a step is one unit of its
+#: logarithm, however far the age is off.
+_STEPS, _LEAP, _STILL = 100_000, 2.0, 1e-12
 
 
 def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Checkpoint:
@@ -162,14 +164,19 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
         # A position has no steady value: it stays where it is.
         return jnp.where(moves, packed - start, jnp.stack(law.state_rate(v, v, tuple(packed), w)))
 
-    def step(_: int, packed: Array) -> Array:
+    def step(carry: tuple) -> tuple:
+        packed, _, count = carry
         value, jacobian = value_and_jacobian(rates, packed)
-        change = solve_points(jacobian, -value)
-        return packed + jnp.clip(change, -_LEAP, _LEAP)
+        change = jnp.clip(solve_points(jacobian, -value), -_LEAP, _LEAP)
+        return packed + change, jnp.abs(change).max(), count + 1
+
+    def unfinished(carry: tuple) -> Array:
+        _, change, count = carry
+        return (change > _STILL) & (count < _STEPS)
 
     # Under w = 1 the initial guess is exact to the last digit.
-    result = jax.lax.fori_loop(0, _STEPS, step, start)
-    return tuple(jnp.where(w == 1, start, result))
+    result, *_ = jax.lax.while_loop(unfinished, step, (start, jnp.where(w == 1, 0.0, jnp.inf), 0))
+    return tuple(result)
 
 
 #: A slider slips if its velocity exceeds this multiple of the fastest drive.
