@@ -65,6 +65,13 @@ def test_at_a_break_point_the_value_after_it_counts_however_times_are_rounded() 
     np.testing.assert_array_equal(p.load([0.3, 3 * 0.1]), [9.0, 9.0])
 
 
+@pytest.mark.parametrize("t", [-0.1, 5.1, [1.0, 6.0]])
+def test_there_is_no_load_beyond_the_programme(t) -> None:
+    p = Programme(RampLoad("10 N", "5 s"), **START)
+    with pytest.raises(InputError, match="t must lie within the programme, 0 to 5 s, got"):
+        p.load(t)
+
+
 def test_modulation_rises_and_falls_with_its_phase() -> None:
     m = Modulate("1 s", 0.24, "12.5 Hz", rise="0.25 s", fall="0.5 s", phase=0.3)
     p = Programme(m, **START)

@@ -109,11 +109,11 @@ class Programme:
         return max(abs(self.level.velocity), *(s.fastest_pull for s in self.segments))
 
     def load(self, t: ArrayLike) -> np.ndarray:
-        """W (N) at times `t` (s); at a break point that after it."""
+        """W (N) at times `t` (s) of the programme; at a break point that after it."""
         return self._evaluate(t, load_of)
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
-        """Pulling velocity (m/s) at times `t` (s); at a break point that after it."""
+        """Pulling velocity (m/s) at times `t` (s) of the programme; at a break point after it."""
         return self._evaluate(t, pull_of)
 
     def position(self, t: ArrayLike) -> np.ndarray:
@@ -127,7 +127,10 @@ class Programme:
         read: Callable[[ProgrammeSegment, Any], Any],
         before: np.ndarray | None = None,
     ) -> np.ndarray:
-        times = obeying(t, "t", "time", "finite")
+        times = np.asarray(obeying(t, "t", "time", "finite"))
+        outside = times[(times < 0) | (times > self.duration * (1 + BREAK))]
+        rule, advice = f"lie within the programme, 0 to {self.duration:g} s", "leave it out"
+        require(not outside.size, "t", rule, f"{next(outside.flat, 0):g} s", advice)
         values = np.empty(times.shape)
         index = np.searchsorted(self.starts[1:-1] * (1 - BREAK), times, side="right")
         for k, segment in enumerate(self.segments):
