@@ -42,7 +42,7 @@ def test_the_age_obeys_the_law_of_ageing(law):
     assert period.plastic_velocity.mean() == pytest.approx(1.0, abs=1e-7)
 
 
-@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic"])
+@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic", "amontons"])
 def test_a_modulated_pull_moves_the_slider(law):
     """dF/dt = K (V p - v) of the pulled spring, with p = 1 + 0.2 cos(wt)."""
     material = asp.materials.load("bureau2000")

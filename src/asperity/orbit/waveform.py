@@ -34,8 +34,8 @@ class Period(NamedTuple):
     velocity : array
         Velocity of the slider over the pulling velocity.
     plastic_velocity : array
-        Velocity of slip over the pulling velocity; differs where asperities are elastic. A law
-        without rate dependence does not determine it: both velocities are then 1.
+        Velocity of slip over the pulling velocity; differs where asperities are elastic. 1 for a
+        law without rate dependence, which does not determine it.
     age : array or None
         Age of the contacts over that of steady sliding, V Phi/D0; None where the law's state is no
         age, or the load is not harmonic; NaN while the interface sticks, where the force does not
@@ -81,9 +81,11 @@ def over_a_period(response: PeriodicResponse) -> Period:
     force, log_slip = response.waveform.reshape(2, -1)
     slip = np.exp(log_slip)
     at = response.load.at(response.theta)
-    elastic = bool(np.any(np.asarray(slider.law.elastic_length) > 0))
+    slips_with_slider = slider.law.rate_dependent and not np.any(
+        np.asarray(slider.law.elastic_length) > 0
+    )
     stretching = omega * W0 / (K * V) * _derivative(force)
-    velocity = np.asarray(at.pull) - stretching if elastic else slip
+    velocity = slip if slips_with_slider else np.asarray(at.pull) - stretching
     friction = force - float(np.ravel(motion.damping)[0]) * velocity
     if "inertial" in motion.name:
         friction = friction - M * V * omega / W0 * _derivative(velocity)
