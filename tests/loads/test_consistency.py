@@ -6,7 +6,15 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
-from asperity.loads import CyclicLoading, Excitation, Harmonic, Modulation, Programme, modulated
+from asperity.loads import (
+    CyclicLoading,
+    Excitation,
+    Harmonic,
+    Modulation,
+    Periodic,
+    Programme,
+    modulated,
+)
 from asperity.loads.consistency import checked_modulation
 
 
@@ -79,9 +87,15 @@ class Fails(Skewed):
         return Skewed(self.b)
 
 
+class OfPullOnly(Skewed):
+    def at(self, theta):
+        return Excitation(w=1.0, pull=super().at(theta).w)
+
+
 @pytest.mark.parametrize(
     ("load", "message"),
     [
+        (OfPullOnly, "give w an entry for each phase, got an array of shape"),
         (Heavier, "a w of mean 1 over the period, got 1.01"),
         (Faster, "a pull of mean 1 over the period, got 1.01"),
         (Lighter, "keep W/W0 positive"),
@@ -110,6 +124,14 @@ def test_a_load_is_checked_by_every_function_that_takes_it() -> None:
 def test_a_field_with_a_text_is_refused() -> None:
     with pytest.raises(InputError, match="numbers for its fields, got '24 %'"):
         checked_modulation(Harmonic("24 %"))
+
+
+@pytest.mark.parametrize(
+    "load", [Harmonic(1.5), Harmonic(np.nan), Periodic(((1.5, 0.0),))], ids=str
+)
+def test_contact_lost_by_a_load_made_without_its_function_is_refused(load) -> None:
+    with pytest.raises(InputError, match=r"must lie in|never lost|finite"):
+        checked_modulation(load)
 
 
 def test_arrays_that_do_not_broadcast_are_refused() -> None:

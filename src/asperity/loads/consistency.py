@@ -9,8 +9,15 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import InputError, code_of_others, require
-from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
+from asperity.loads.modulation import (
+    Excitation,
+    Harmonic,
+    Modulation,
+    Periodic,
+    require_contact_within_period,
+)
 from asperity.parameters.arguments import broadcast_shape, shown
+from asperity.parameters.rules import obeying
 
 #: Numbers of samples of the period; a fault counts if it remains with more samples.
 _SAMPLES = (64, 1024, 16384)
@@ -29,8 +36,8 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
     Parameters
     ----------
     modulation : Modulation
-        Numbers or arrays of any shapes that broadcast. `Harmonic` and `Periodic` agree by their
-        construction.
+        Numbers or arrays of any shapes that broadcast. Members of `Harmonic` and `Periodic` agree
+        by their construction.
     name : str
         Name of the modulation in messages.
 
@@ -46,7 +53,11 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
     for leaf in leaves:
         if isinstance(leaf, str):
             raise InputError(name, "have numbers for its fields", shown(leaf), "give them in SI")
-    if type(modulation) in (Harmonic, Periodic):
+    if type(modulation) is Harmonic:
+        obeying(modulation.epsilon, f"{name}.epsilon", "dimensionless", "amplitude")
+        return modulation
+    if type(modulation) is Periodic:
+        require_contact_within_period(modulation.load)
         return modulation
     shape = broadcast_shape(name, *leaves)
     flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
@@ -78,6 +89,8 @@ def _check_samples(modulation: Modulation, samples: int, name: str) -> None:
     theta = 2 * np.pi * np.arange(samples) / samples
     at = modulation.at(theta[:, None])
     amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))
+    rule, got = "give w an entry for each phase", f"an array of shape {np.shape(at.w)}"
+    require(np.shape(at.w)[:1] == (samples,), f"{name}.at", rule, got, "fill an array")
     values = {
         field: np.asarray(value, float) * np.ones((samples, amplitude.size))
         for field, value in zip(Excitation._fields, at, strict=True)

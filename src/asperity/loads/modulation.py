@@ -239,7 +239,7 @@ def modulated(
     speed = _pair(to_si(pull, "dimensionless", "pull"), to_radians(pull_phase, "pull_phase"))
     gain = np.tan(obeying(to_radians(tilt, "tilt"), "tilt", "dimensionless", "below a right angle"))
     shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
-    _require_contact(series)
+    require_contact_within_period(series)
     swing = (speed,) if any(np.any(part) for part in speed) else ()
     return Periodic(series, shear, swing)
 
@@ -307,7 +307,7 @@ def sampled(
     if all(values is None for values in given.values()):
         raise InputError("load, velocity or shear", "be given", "none", "give samples of one")
     series = {name: _series_of(name, values, harmonics) for name, values in given.items()}
-    _require_contact(series["load"])
+    require_contact_within_period(series["load"])
     return Periodic(series["load"], series["shear"], series["velocity"])
 
 
@@ -360,7 +360,7 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
     return tuple((2 * c.real, -2 * c.imag) for c in kept)
 
 
-def _require_contact(series: Series) -> None:
+def require_contact_within_period(series: Series) -> None:
     """Raise `InputError` where the load does not stay positive over the period."""
     lowest = float(np.min(_lowest_load(series), initial=np.inf))
     if not lowest > 0:
