@@ -1,5 +1,6 @@
 """`.plot()` draws the numbers of the object, and marks failed and unstable points."""
 
+import dataclasses
 from io import BytesIO
 
 import matplotlib.image
@@ -70,6 +71,13 @@ def test_titles_and_labels_of_figures_have_one_micro_sign() -> None:
     assert "V 1 µm/s" in one.plot("geophysics").get_suptitle()
     legend = rows.plot().axes[0].get_legend().get_texts()
     assert [text.get_text() for text in legend] == ["V 1 µm/s", "V 10 µm/s"]
+
+
+def test_the_title_of_a_modulation_without_first_harmonic_of_the_load_leaves_epsilon_out() -> None:
+    response = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.1, frequency=120.0)
+    assert "ε 0.1" in response.plot().get_suptitle()
+    pulled = dataclasses.replace(response, load=asp.loads.modulated(pull=0.5))
+    assert "ε" not in pulled.plot().get_suptitle()
 
 
 def test_a_file_in_place_of_the_set_of_names_is_refused() -> None:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from asperity.errors import require
 from asperity.figures.map import axis_unit, label
 from asperity.figures.style import ELASTO_PLASTIC, GREY, RICE_RUINA, new_figure
+from asperity.loads import Harmonic
 from asperity.units import format_si
 
 if TYPE_CHECKING:
@@ -141,6 +142,8 @@ def _cycle(response: PeriodicResponse) -> Figure:
             ("ε", response.epsilon, "dimensionless"),
             ("f", response.frequency, "frequency"),
         )
+        # The first harmonic of the load says nothing of a modulation that leaves it out.
+        if name != "ε" or isinstance(response.load, Harmonic) or np.any(value)
     )
     state = "stable" if response.stable.item() else str(response.result.item())
     if response.converged.item() and not response.stable.item():
