@@ -121,6 +121,15 @@ def test_a_load_is_checked_by_every_function_that_takes_it() -> None:
         Programme(CyclicLoading(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
 
 
+def test_no_step_of_a_transient_misses_a_pulse_of_a_load() -> None:
+    step = CyclicLoading("1 s", Skewed(0.999), "1 Hz")
+    (segment,) = Programme(step, load=7.0, velocity=1e-6).segments
+    # Of the variance, the sum of q^2n, half lies in the first 8 harmonics.
+    q = 0.999 / (1 + np.sqrt(1 - 0.999**2))
+    assert q**16 < 0.5 < q**14
+    assert segment.longest_step == pytest.approx(0.1 / 8)
+
+
 def test_a_field_with_a_text_is_refused() -> None:
     with pytest.raises(InputError, match="numbers for its fields, got '24 %'"):
         checked_modulation(Harmonic("24 %"))

@@ -20,7 +20,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import configure
-from asperity.loads.modulation import Excitation, Modulation, Series, fourier_sum
+from asperity.loads.modulation import Excitation, Modulation, Periodic, Series, fourier_sum
 
 configure()  # double precision, before any segment makes an array
 
@@ -234,6 +234,17 @@ class HarmonicSegment(ProgrammeSegment):
         return self._level and not self._swings
 
 
+#: Instants of a period of a modulation at which it is evaluated.
+_INSTANTS = 4096
+
+
+def _dominant(values: ArrayLike) -> int:
+    """Number of harmonics with half of the variance of a period: many for a narrow pulse."""
+    period = np.round(np.asarray(values) * np.ones(_INSTANTS), 12)  # a constant without rounding
+    power = np.cumsum(np.abs(np.fft.rfft(period)[1:]) ** 2)
+    return int(np.searchsorted(power, power[-1] / 2)) + 1
+
+
 class PeriodicSegment(ProgrammeSegment):
     """A periodic modulation of any form about constant levels.
 
@@ -280,23 +291,28 @@ class PeriodicSegment(ProgrammeSegment):
         return self.pull1 * (jnp.asarray(t) + swing / self._omega)
 
     def _over_a_period(self) -> np.ndarray:
-        return np.linspace(0, 1 / float(self.frequency), 513)
+        return np.arange(_INSTANTS) / _INSTANTS / float(self.frequency)
 
     @property
     def lowest_load(self) -> float:
-        """The lowest load at 512 instants of a period."""
+        """The lowest load at the instants of a period."""
         return float(np.min(load_of(self, self._over_a_period())))
 
     @property
     def fastest_pull(self) -> float:
-        """The fastest pull at 512 instants of a period."""
+        """The fastest pull at the instants of a period."""
         return float(np.max(np.abs(pull_of(self, self._over_a_period()))))
 
     @property
     def longest_step(self) -> float:
-        """A tenth of the period of the highest harmonic."""
-        series = [getattr(self.modulation, name, ()) for name in ("load", "shear", "pull")]
-        return 0.1 / float(self.frequency) / max(1, *map(len, series))
+        """A tenth of the period of the highest harmonic, of a user's load of its dominant ones."""
+        modulation = self.modulation
+        if isinstance(modulation, Periodic):
+            highest = max(map(len, (modulation.load, modulation.shear, modulation.pull)))
+        else:
+            at = modulation.at(2 * np.pi * np.arange(_INSTANTS) / _INSTANTS)
+            highest = max(_dominant(part) for part in (at.w, at.shear, at.pull))
+        return 0.1 / float(self.frequency) / max(1, highest)
 
     @property
     def period(self) -> float | None:
