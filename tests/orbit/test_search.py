@@ -5,9 +5,10 @@ import pytest
 
 import asperity as asp
 from asperity.laws import RiceRuina
-from asperity.loads import Harmonic
+from asperity.loads import Harmonic, Periodic
+from asperity.orbit.methods import collocation
 from asperity.orbit.methods.branch_following import RUNAWAY, continues
-from asperity.orbit.outcome import Outcome
+from asperity.orbit.outcome import Outcome, sentence
 from asperity.orbit.search import find_orbits, mark_too_unstable
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import equation_of_motion
@@ -45,6 +46,28 @@ def test_failed_points_with_large_growth_are_too_unstable(outcome, share, epsilo
     assert solution.outcome.tolist() == [outcome, Outcome.CONVERGED, Outcome.SENSITIVE]
     assert solution.detail[2] == pytest.approx(epsilon, rel=1e-12)
     assert solution.detail[0] == share
+
+
+def test_a_pull_that_is_too_unstable_to_follow_has_no_epsilon_at_which_it_is_lost():
+    problem = points(np.array([0.1]) * KC, 0.1, 0.4)._replace(
+        load=Periodic(pull=((np.array([0.4]), np.zeros(1)),))
+    )
+    solution = Solution.empty(2, 1, OPTIONS)
+    solution.detail[:] = 0.5
+    mark_too_unstable(problem, solution)
+    assert "the branch stops at 0.5 of the requested amplitude" in sentence(*solution.outcome, 0.5)
+
+
+def test_multipliers_that_stay_unresolved_keep_their_last_change(monkeypatch):
+    def refine(problem, solution, *_):
+        solution.outcome[:] = [Outcome.MULTIPLIERS_NOT_RESOLVED, Outcome.NOT_RESOLVED]
+        solution.detail[:] = 5e-7
+
+    monkeypatch.setattr(collocation, "refine", refine)
+    problem = points(np.full(2, KC), 0.1, 0.4)
+    solution = collocation.refined_where_resolved(problem, OPTIONS, None, None)
+    assert solution.outcome.tolist() == [Outcome.MULTIPLIERS_NOT_RESOLVED, Outcome.NO_ORBIT]
+    assert solution.detail.tolist() == [5e-7, 0.0]
 
 
 def test_a_branch_close_to_arriving_may_exceed_the_runaway_limit_a_little():

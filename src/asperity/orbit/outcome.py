@@ -84,7 +84,7 @@ _SENTENCES = {
         "on the branch from steady sliding the slider comes to rest once a period from epsilon = "
         "{detail:.3g} on, where its velocity has no logarithm: inertia without elastic asperities "
         "takes it as a state; lower epsilon, leave inertia out, or take a law that is smooth at "
-        "rest, such as 'regularised'"
+        "rest, such as 'regularised', whose motion asperity.transient follows through rest"
     ),
     Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }

@@ -58,7 +58,8 @@ def mark_too_unstable(problem: Problem, solution: Solution) -> None:
     """Give failed points the outcome SENSITIVE where disturbances of slow sliding grow too much."""
     failed = np.isin(solution.outcome, (Outcome.NO_ORBIT, Outcome.NOT_RESOLVED))
     amplitude = np.broadcast_to(problem.load.amplitude, failed.shape)
-    rows = np.flatnonzero(failed & solution.informed)
+    # Without a first harmonic of the load there is no epsilon at which the branch is lost.
+    rows = np.flatnonzero(failed & solution.informed & (amplitude > 0))
     for part, growth in run_chunks(adiabatic_growth, (problem,), rows, _GROWTH_CHUNK):
         part = part[growth > LARGEST_GROWTH]
         share = np.where(solution.outcome[part] == Outcome.NO_ORBIT, solution.detail[part], 1.0)

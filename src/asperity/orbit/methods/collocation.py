@@ -159,8 +159,8 @@ def refined_where_resolved(
     """
     solution = Solution.unsolved(problem, options)
     refine(problem, solution, orbit, index, options)
-    solution.outcome[solution.outcome == Outcome.NOT_RESOLVED] = Outcome.NO_ORBIT
-    solution.detail[~solution.converged] = 0.0
+    doubtful = solution.outcome == Outcome.NOT_RESOLVED
+    solution.outcome[doubtful], solution.detail[doubtful] = Outcome.NO_ORBIT, 0.0
     options.progress(int(solution.converged.sum()))
     return solution
 
