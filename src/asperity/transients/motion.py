@@ -189,7 +189,8 @@ def transient(
         Steps of load and drive, from `asperity.loads`.
     initial : "steady" or array, shape (size,)
         Steady sliding under the load and velocity before the first step, or states of the
-        equation of motion, such as the last row of another trajectory's `states`.
+        equation of motion at t = 0, such as the last row of another trajectory's `states`. A step
+        of the load with which the programme begins changes the former, not the latter.
     sampling : float, str or array, optional
         Rate (Hz) or times (s) at which to write; by default the steps of the integrator, which
         are short where the states change fast. The solution is a polynomial on every step: a
