@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import DOP853, solve_ivp
@@ -211,6 +212,37 @@ def test_steady_sliding_under_a_load_far_from_that_of_the_slider_is_steady() -> 
     # c F_i / (B W0) is 600: as many Newton steps of the logarithm of the age.
     np.testing.assert_allclose(first.states[0], 6 * 0.5, rtol=1e-12)
     np.testing.assert_allclose(first.states[1], 2 / 0.01 * 6 * 0.5, rtol=1e-12)
+
+
+class Viscous(asp.laws.Law):
+    """F/W = mu0 + A ln(v/V0)."""
+
+    name, source, state_names = "viscous-of-tests", "none", ()
+    mu0: float = asp.laws.parameter("law.mu0", "dimensionless")
+    A: float = asp.laws.parameter("law.A", "dimensionless")
+    V0: float = asp.laws.parameter("law.V0", "velocity")
+
+    def friction(self, v, state, w):
+        return self.mu0 + self.A * jnp.log(v / self.V0)
+
+    def log_velocity(self, friction, state, w):
+        return jnp.log(self.V0) + (friction - self.mu0) / self.A
+
+    def state_rate(self, v, v_plastic, state, w):
+        return ()
+
+    def steady_state(self, v):
+        return ()
+
+
+def test_a_law_without_states_follows_the_drive_as_a_logistic_function() -> None:
+    slider = asp.Slider(Viscous(mu0=0.5, A=0.02, V0=1e-6), spring=2e5, load=7.0)
+    programme = Programme(StepLoad("8 N"), Slide("1 s", "3 um/s"), load="7 N", velocity="1 um/s")
+    motion = transient(slider, programme, sampling="10 Hz", rtol=1e-8)
+    # A W v'/v = K (V - v), from F = 7 N * 0.5 under 8 N.
+    first = 1e-6 * np.exp((3.5 / 8 - 0.5) / 0.02)
+    growth = np.exp(-2e5 * 3e-6 / (0.02 * 8) * motion.time)
+    np.testing.assert_allclose(motion.velocity, 3e-6 / (1 + (3e-6 / first - 1) * growth), rtol=1e-6)
 
 
 def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:

@@ -225,11 +225,10 @@ def states_after_jump(motion: Motion, before: Excitation, after: Excitation, Y: 
     states, law = Y[:-1], motion.slider.law
     jump = motion.force(states, before) - motion.force(states, after)  # x K / W0
 
-    def state_rates(v: Array) -> Array:
-        rates = law.state_rate(v, motion.V, motion.law_state(states), after.w)
-        return jnp.stack(jnp.broadcast_arrays(*rates))
+    def state_rates(v: Array) -> tuple[Array, ...]:
+        return tuple(law.state_rate(v, motion.V, motion.law_state(states), after.w))
 
     _, per_way = jax.jvp(state_rates, (motion.V,), (jnp.ones_like(motion.V),))
     displacement = jump * motion.slider.W0 / motion.slider.K
-    jumps = jnp.concatenate([jnp.zeros(len(motion.mechanical)), per_way * displacement, jump[None]])
-    return Y + jumps
+    changes = (*(0 * jump for _ in motion.mechanical), *(p * displacement for p in per_way), jump)
+    return Y + jnp.stack(jnp.broadcast_arrays(*changes))

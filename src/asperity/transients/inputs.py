@@ -156,6 +156,8 @@ def _steady(first: SegmentEquations, v: Array, w: Array) -> Array:
 
 def _steady_state(law: Law, v: Array, w: Array) -> State:
     """States of the law at `v` under the load `w`, by Newton's method from those under w = 1."""
+    if not law.state_names:
+        return ()
     start = jnp.stack([jnp.asarray(s, float) for s in law.steady_state(v)])
 
     moves = np.array([name == POSITION for name in law.state_names])
