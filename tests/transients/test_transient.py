@@ -263,6 +263,8 @@ def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
     (reversal,) = motion.event_times("reversal")
     np.testing.assert_allclose(np.interp(reversal, motion.time, motion.force), 0, atol=0.05)
     assert motion.velocity[-1] < 0 < motion.velocity[0]
+    forwards, backwards = motion.event_times("steady")
+    assert forwards == 0 < reversal < backwards
 
 
 def test_a_run_continues_from_the_states_of_another(physical) -> None:

@@ -152,9 +152,9 @@ def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     friction = system.friction(at, states)
     elastic = isinstance(motion, QuasiStatic) or "friction" in motion.mechanical
     slip = motion.slip_velocity(friction, states, at) if elastic else velocity
-    speed = jnp.where(at.pull > 0, at.pull, jnp.nan)
-    change = jnp.abs(motion.rates(states, at)).max(0) / (motion.kappa * speed)
-    unsteadiness = jnp.maximum(change, jnp.abs(velocity / speed - 1))
+    pull = jnp.where(at.pull != 0, at.pull, jnp.nan)
+    change = jnp.abs(motion.rates(states, at) / (motion.kappa * pull)).max(0)
+    unsteadiness = jnp.maximum(change, jnp.abs(velocity / pull - 1))
     force = motion.force(states, at)
     # One array: every output of a compiled program costs time.
     columns = MotionSamples(force, at.w, velocity, slip, friction, unsteadiness)

@@ -99,9 +99,10 @@ class EventThresholds:
     Attributes
     ----------
     slip : float
-        Velocity of the slider (m/s) above which it slips.
+        Plastic velocity (m/s) of either sign above which the slider slips.
     runaway : float
-        Plastic velocity (m/s) above which a slider without inertia counts as running away.
+        Plastic velocity (m/s) of either sign above which a slider without inertia counts as running
+        away.
     steady : float
         Relative deviation below which sliding counts as steady, or change of a state over a period
         below which the response to a modulation counts as steady.
@@ -143,7 +144,7 @@ class EventDetector:
         def log_speed(velocity: np.ndarray, threshold: float) -> np.ndarray:
             # The velocity of a slider that runs away may overflow.
             with np.errstate(over="ignore"):
-                return np.log(np.maximum(velocity * V, 1e-300)) - np.log(threshold)
+                return np.log(np.maximum(np.abs(velocity * V), 1e-300)) - np.log(threshold)
 
         level = thresholds.level
         #: Events are changes of the sign of these distances.
