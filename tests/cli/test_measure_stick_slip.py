@@ -90,7 +90,7 @@ def test_a_column_without_a_meaning_is_asked_for(asperity, tmp_path) -> None:
 
 TRUTH = {"A": 0.015, "B": 0.027, "D0": 0.5e-6}
 W0 = 5.0
-#: Stiffnesses over the critical one (Bureau et al., 2000, Eq. 16), not centred on it.
+#: Stiffnesses over the critical one (Bureau et al., 2000, Eq. 18), not centred on it.
 RATIOS = (0.75, 0.91, 1.06, 1.4)
 CRITICAL = (TRUTH["B"] - TRUTH["A"]) * W0 / TRUTH["D0"]
 
@@ -134,7 +134,7 @@ def test_two_commands_give_the_numbers_of_the_law(asperity, campaign, tmp_path) 
         # One bracket at two velocities is one error: their mean is no surer than either.
         width = (bracket[1] - bracket[0]) / np.sqrt(12)
         assert float(row["K_over_W0_err"]) == pytest.approx(width * np.sqrt(2), rel=1e-5)
-        # Eq. (17), at the threshold.
+        # Eq. (19), at the threshold.
         omega = np.sqrt((TRUTH["B"] - TRUTH["A"]) / TRUTH["A"]) * float(row["V"]) / TRUTH["D0"]
         off = float(row["frequency"]) - omega / (2 * np.pi)
         assert abs(off) < 2.5 * float(row["frequency_err"]) < 0.25 * omega

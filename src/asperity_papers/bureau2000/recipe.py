@@ -2,7 +2,7 @@
 
 1. A - B is the slope of the mean friction with ln V, without modulation (section III).
 2. At the bifurcation between steady sliding and stick-slip, K/W0 = (B - A)/D0 and
-   omega = sqrt((B - A)/A) V/D0 (Eqs. 16 and 17): with step 1 these give A, B and D0.
+   omega = sqrt((B - A)/A) V/D0 (Eqs. 18 and 19): with step 1 these give A, B and D0.
 3. eps_ratio = eps_eff/eps makes the drop of the mean that of the Rice-Ruina law (III.A.2).
 4. lambda makes mu1 that of the elasto-plastic law, at that eps_ratio (III.C).
 5. The drop bounds alpha of the Linker-Dieterich law, at that eps_ratio (III.B).

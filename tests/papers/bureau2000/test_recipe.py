@@ -24,7 +24,7 @@ def procedure(columns, bifurcations, name="bifurcations", **fixed):
 
 @pytest.fixture(scope="module")
 def exact():
-    """Columns of a table without noise, and the exact bifurcations (Eqs. 16 and 17)."""
+    """Columns of a table without noise, and the exact bifurcations (Eqs. 18 and 19)."""
     numbers = {n: TRUTH[n] for n in ("mu0", "A", "B", "D0")} | {"V0": 1e-6}
     V, epsilon = np.repeat([1e-6, 1e-5], 4), np.tile([0.2, 0.3, 0.4, 0.5], 2)
     # The drop is that of the Rice-Ruina law, which step 3 of the paper assumes.

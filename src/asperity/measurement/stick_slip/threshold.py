@@ -6,7 +6,7 @@ softest that slides steadily. The frequency there is that of oscillations whose 
     T = T0 + c drop^2,       T0 proportional to 1/sqrt(K)
 
 near the threshold, where the cycles are those of the linear equation of motion (Bureau et al.,
-2000, Eqs. 16 and 17: omega^2 = K V^2 / (A W0 D0)). T0 comes from cycles that grow out of steady
+2000, Eqs. 18 and 19: omega^2 = K V^2 / (A W0 D0)). T0 comes from cycles that grow out of steady
 sliding or die away to it, or, if no recording has such cycles, from regular cycles at several
 stiffnesses. Cycles with sticks are not used: their force rises at K V/W0, that of a sine at
 pi drop/T.
