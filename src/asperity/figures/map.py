@@ -135,7 +135,8 @@ def colours(dataset: xarray.Dataset, show: str) -> Normalize:
         reach = max(abs(low - middle), abs(high - middle)) or 1.0
         return CenteredNorm(middle, halfrange=reach)
     if low > 0 and high > _DECADES * low:
-        return LogNorm(values.min(), values.max())
+        # An amplitude that is zero at some points has the colour of the smallest one that is not.
+        return LogNorm(values[values > 0].min(), values.max(), clip=True)
     return Normalize(values.min(), values.max()) if values.size else Normalize(0.0, 1.0)
 
 

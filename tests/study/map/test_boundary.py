@@ -183,6 +183,18 @@ def test_a_quantity_of_each_kind_of_colours_can_be_drawn(show, tmp_path) -> None
     assert (tmp_path / "map.png").stat().st_size > 10_000
 
 
+def test_a_point_without_modulation_is_drawn_on_a_logarithmic_scale(tmp_path) -> None:
+    values = np.geomspace(1e-6, 1e-2, 12).reshape(3, 4)
+    values[0, 0] = 0.0
+    dataset = planted(mu2=(("K", "epsilon"), values, {"units": "1", "long_name": "x"}))
+    with style():
+        figure = draw_map(dataset, "mu2")
+        figure.savefig(tmp_path / "map.png")
+    colours = figure.axes[0].collections[0].norm
+    assert colours.vmin == values[0, 1]
+    assert not np.ma.is_masked(colours(values))
+
+
 def test_axes_are_labelled_in_readable_units() -> None:
     assert axis_unit(planted()["K"]) == (1e3, "N/mm")
     with style():
