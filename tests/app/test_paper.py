@@ -33,6 +33,7 @@ def test_curves_are_those_of_the_package(figure):
     printed = answer["printed"][1]["values"]["mu1"]
     assert np.abs(np.array(curve["values"]["mu1"][1:]) / printed[1:] - 1).min() > 0.01
     assert answer["numbers"]["K"] == pytest.approx(3e5)
+    assert answer["command"].startswith("# no command")
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,9 @@ def figure(question: MovedFigure) -> dict[str, Any]:
     answer: dict[str, Any] = {
         "numbers": {n: numbers[n].si for n in words.figures[question.figure].numbers},
         "python": chosen.python(_changes(question)),
-        "command": f"asperity reproduce {paper.name} --out report",
+        "command": "# no command draws the figures with moved numbers: copy as Python"
+        if question.numbers
+        else f"asperity reproduce {paper.name} --out report",
     }
     task = _task(paper, question.figure)
     if not is_ready(task):

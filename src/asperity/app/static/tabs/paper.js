@@ -156,8 +156,8 @@ export function create(page) {
       ],
       points: (stated[row.column] || []).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", title: s.text })),
     }));
-    const largest = Math.max(...moved.flatMap(xs));
-    const range = x.log ? undefined : x.column === "phase" ? [0, 1] : [0, 1.02 * largest];
+    const places = moved.flatMap(xs);
+    const range = x.log ? undefined : x.column === "phase" ? [0, 1] : [Math.min(0, ...places), 1.02 * Math.max(...places)];
     figure.draw({ x: { label: x.label + unit, log: x.log, range }, rows: drawn },
       `${asSentence()} Curves: ${moved.map((c) => c.name).join(", ")}.`);
     const hasStated = rows.some((row) => stated[row.column]);
