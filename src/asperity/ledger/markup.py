@@ -25,7 +25,7 @@ _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"10\^\+", "10^"),
         (r"\^\(([^()]*)\)", r"<sup>\1</sup>"),
         (r"\^(-?\d+(?:\.\d+)?)", r"<sup>\1</sup>"),
-        (r"(?<=\w)_(eff|asp|ss|st|pl|el|r|s|c|p|z|0z)\b", r"<sub>\1</sub>"),
+        (r"(?<=\w)_(eff|asp|ss|st|pl|el|r|s|c|p|z|0z|n|h)\b", r"<sub>\1</sub>"),
         (r"\b([ΔWKVDPRhμσΣΦωwFXJ])([012])(z?)\b", r"\1<sub>\2\3</sub>"),
         (r"\bKc\b", "K<sub>c</sub>"),
         (r"(?<![\w.&#])-(?=[\dA-Zμελκ])", "−"),

@@ -149,9 +149,8 @@ def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
         f"<p>{sum(claim.is_test for claim in claims)} of the {len(claims)} statements could have "
         f"come out otherwise; each number leads to its entries:</p>{_tiles(claims)}"
         f"<p>{escape(_counted_apart(claims))}</p>"
-        "<p>Verdicts follow from a rule that was fixed beforehand for each claim. The measured "
-        "points of a paper are in its figures only, not in its text; no claim here rests on "
-        f"them.</p>{varied if ends else ''}\n{_entries(claims)}"
+        "<p>Verdicts follow from a rule that was fixed beforehand for each claim.</p>"
+        f"{varied if ends else ''}\n{_entries(claims)}"
     )
 
 
@@ -355,7 +354,7 @@ def _parameters(paper: Paper) -> str:
         "Place": "place", "Remark": "note",
     }  # fmt: skip
     return (
-        "<p>As the paper gives them. <em>Fitted</em> by its authors; <em>assumed</em> here, "
+        "<p>As the paper gives them. <em>Fitted</em>: the result of a fit; <em>assumed</em> here, "
         "because the paper does not give it.</p>"
         f"{table(heads, rows, 'Parameters', 'ledger numbers')}"
     )
