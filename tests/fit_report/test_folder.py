@@ -98,6 +98,18 @@ def test_each_frequency_has_a_curve_that_reaches_its_readings(monkeypatch):
         assert (np.diff(width) < 0).all()
 
 
+def test_rows_that_differ_by_the_noise_of_a_measured_setting_are_one_series():
+    noise = 1e-4 * np.array([1.0, -2.0, 0.5, 0.0])
+    settings = {"V": np.array([1e-5, 1e-6, 1e-6, 1e-5]), "W0": 7.0 + noise}
+    settings |= {"frequency": 120.0 + noise, "epsilon": np.linspace(0.1, 0.4, 4)}
+    series = [(label, rows.tolist()) for label, rows in bands._series(settings)]
+    slow, fast = [False, True, True, False], [True, False, False, True]
+    assert series == [("1 µm/s", slow), ("10 µm/s", fast)]
+    settings["W0"] = np.array([3.0, 7.0, 3.0, 3.0]) + noise
+    labels = [label for label, _ in bands._series(settings)]
+    assert labels == ["1 µm/s, W0 = 3", "1 µm/s, W0 = 7", "10 µm/s, W0 = 3"]
+
+
 def nothing_is_fetched(page):
     return not re.findall(r'(?:src|href)="(?!#)[^"]*"', page) and "@import" not in page
 

@@ -95,15 +95,17 @@ def bands_of(fit: Fit, term: LockInTerm, posterior: Posterior | None) -> list[Se
 
 
 def _series(settings: Mapping[str, Float]) -> list[tuple[str, Bool]]:
-    """Labels and rows of series, by everything but the amplitude."""
-    names = [n for n in ("V", "frequency", *settings) if n != "epsilon"]
-    names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(settings[n]).size > 1]
-    columns = np.stack([settings[n] for n in names])
-    result = []
-    for values in np.unique(columns, axis=1).T:
-        label = ", ".join(_label(n, v) for n, v in zip(names, values, strict=True))
-        result.append((label, (columns == values[:, None]).all(0)))
-    return result
+    """Labels and rows of series, by everything but the amplitude.
+
+    Rows whose labels are the same are one series: a measured load or frequency differs from row to
+    row by its noise.
+    """
+    names = [n for n in dict.fromkeys(("V", "frequency", *settings)) if n != "epsilon"]
+    texts = {n: [_label(n, v) for v in settings[n]] for n in names}
+    names = [n for n in names if n == "V" or len(set(texts[n])) > 1]
+    labels = np.array([", ".join(row) for row in zip(*(texts[n] for n in names), strict=True)])
+    order = np.lexsort([settings[n] for n in reversed(names)])
+    return [(str(label), labels == label) for label in dict.fromkeys(labels[order])]
 
 
 def _label(name: str, value: float) -> str:
