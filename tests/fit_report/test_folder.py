@@ -12,10 +12,11 @@ from asperity import Slider, materials, periodic_response
 from asperity.errors import InputError, named
 from asperity.fit_report import bands, write_comparison, write_report
 from asperity.fit_report.folder import document
-from asperity.fit_report.pictures import run_figure
+from asperity.fit_report.pictures import residual_figure, run_figure
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
+from asperity.inference.objective import Residuals
 from asperity.orbit import response_function
 from asperity.outputs.sections import Section, as_html
 
@@ -108,6 +109,16 @@ def test_rows_that_differ_by_the_noise_of_a_measured_setting_are_one_series():
     settings["W0"] = np.array([3.0, 7.0, 3.0, 3.0]) + noise
     labels = [label for label, _ in bands._series(settings)]
     assert labels == ["1 µm/s, W0 = 3", "1 µm/s, W0 = 7", "10 µm/s, W0 = 3"]
+
+
+def test_residuals_are_data_less_the_law_at_the_rows_of_the_file():
+    residuals = Residuals(
+        np.array([2.0, -1.0]), np.zeros((2, 0)), np.array(["mu1", "mu1"]), np.array([0, 1]), 0.0
+    )
+    axis = residual_figure(residuals, np.array(["row 2", "row 5 of a.csv"])).axes[0]
+    (points,) = (line for line in axis.get_lines() if line.get_label() == "mu1")
+    assert points.get_ydata().tolist() == [-2.0, 1.0]
+    assert [axis.xaxis.get_major_formatter()(x, None) for x in (0, 1, 2)] == ["", "2", "5"]
 
 
 def nothing_is_fetched(page):

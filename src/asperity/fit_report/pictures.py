@@ -116,19 +116,32 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
 
 
 def residual_figure(residuals: Residuals, rows: np.ndarray) -> Figure:
-    """Residuals in standard uncertainties, by row."""
+    """Data less the law in standard uncertainties, by row.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    rows : array of str
+        Names of the rows, such as "row 3" or "row 3 of a.csv".
+    """
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    # Rows of the file that are no readings are not in the table.
+    numbers = {k: name.split(" of ")[0].removeprefix("row ") for k, name in enumerate(rows, 1)}
     with style():
         figure = new_figure(6.4, 3.0)
         axis = figure.subplots()
         for k, name in enumerate(dict.fromkeys(residuals.observable.tolist())):
             at = residuals.observable == name
             axis.plot(
-                residuals.row[at] + 1, residuals.values[at], "o", ms=3, color=f"C{k}", label=name
+                residuals.row[at] + 1, -residuals.values[at], "o", ms=3, color=f"C{k}", label=name
             )
         axis.axhspan(-2, 2, color="0.5", alpha=0.15, lw=0)
         axis.set_xlabel("row")
-        axis.set_ylabel("residual / uncertainty")
+        axis.set_ylabel("(data - law) / uncertainty")
         axis.set_xlim(0, len(rows) + 1)
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: numbers.get(round(x), "")))
         axis.legend(fontsize=8, ncols=3)
         return figure
 

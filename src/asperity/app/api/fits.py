@@ -290,11 +290,11 @@ def _report(result: Any, posterior: Any, names: Names) -> str:
 
 
 def _residuals(result: Any) -> dict[str, list[Any]]:
-    """Whitened residuals of the readings, with the observable of each."""
+    """Readings less the law in standard uncertainties, whitened, with the observable of each."""
     from asperity.inference.tables.term import LockInTerm
 
     parts = [residuals for _, residuals in result.parts(LockInTerm)]
-    values = [x for r in parts for x in r.values.tolist()]
+    values = [-x for r in parts for x in r.values.tolist()]
     names = [str(n) for r in parts for n in r.observable]
     return {"value": values, "observable": names}
 

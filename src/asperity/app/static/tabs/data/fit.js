@@ -308,7 +308,7 @@ export class FitPanel {
     const of = (n) => at.filter((_, i) => observable[i] === n);
     const far = 1.1 * Math.max(3, ...value.map(Math.abs));
     figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
-      y: { label: "residual", range: [-far, far] },
+      y: { label: "data − law", range: [-far, far] },
       lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
       points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
     }] }, `Residuals of ${names.join(", ")}.`);
