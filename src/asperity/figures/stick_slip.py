@@ -33,6 +33,8 @@ _MARKS = "osD^vP"
 def draw_stick_slip(measurement: StickSlipMeasurement) -> Figure:
     """The recording with its regimes, some events, and drop against stick time.
 
+    Bars are 95 % intervals, as in the other figures of measurements.
+
     Parameters
     ----------
     measurement : StickSlipMeasurement
@@ -88,8 +90,8 @@ def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
         return
     waits, drops = events.stick_duration[known], events.drop[known]
     axis.errorbar(
-        waits, drops, yerr=events.drop_uncertainty[known], fmt="o", color=ELASTO_PLASTIC,
-        markersize=2.5, linewidth=0.7,
+        waits, drops, yerr=NORMAL * events.drop_uncertainty[known], fmt="o",
+        color=ELASTO_PLASTIC, markersize=2.5, linewidth=0.7,
     )  # fmt: skip
     axis.axhline(measurement.smallest_drop, color=GREY, linewidth=0.8, linestyle="--")
     axis.text(
