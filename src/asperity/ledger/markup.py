@@ -13,7 +13,7 @@ from asperity.parameters.arguments import typed
 
 #: Names of Greek letters. In HTML the letters have the same names, but for eps.
 _GREEK = re.compile(
-    r"\b(alpha|Delta|eps|eta|gamma|kappa|lambda|mu|omega|Phi|pi|Sigma|sigma)(?=\b|[_\d])"
+    r"\b(alpha|beta|Delta|eps|eta|gamma|kappa|lambda|mu|omega|Phi|pi|Sigma|sigma|theta)(?=\b|[_\d])"
 )
 _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), shown)

@@ -129,7 +129,7 @@ def _figure(shown: PaperFigure, folder: Path) -> str:
     files += [f"data/{table.name}.csv" for table in shown.tables]
     links = " ".join(
         f'<a href="{escape(name)}">{Path(name).suffix[1:].upper()}'
-        f"{' of the model' * ('-model.' in name)}</a>"
+        f"{' of the model' * ('-model.' in name)}{' of the points' * ('-points.' in name)}</a>"
         for name in files
     )
     return (
