@@ -262,6 +262,8 @@ def test_the_link_of_a_scene_restores_it_without_a_barrier_that_axe_knows_of(vis
     still = {"color_scheme": "light", "reduced_motion": "reduce"}
     page = visit(f"#{tab}?{SCENES[tab]}", **still, bypass_csp=True)
     controls, figures = settled(page, tab)
+    # The force over the mean load, not over the load.
+    assert ("τ/σ̄" in str(figures)) == (tab == "explore")
     address = page.url.split("#", 1)[1]
     query = parse_qs(address.split("?", 1)[1])
     assert {n: query.get(n) for n in parse_qs(SCENES[tab])} == parse_qs(SCENES[tab])

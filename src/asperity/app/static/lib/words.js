@@ -35,7 +35,7 @@ export const symbolOf = (parameter) => (chosen === "geophysics" && parameter.geo
 export const nameOf = (name) => (chosen === "geophysics" && usual[name]) || name;
 
 const LABELS = [
-  [/W\/W₀/g, "σ/σ̄"], [/F\/W₀?/g, "τ/σ"], [/W₀/g, "σ̄"], [/\bA − B\b/g, "a − b"], [/\bage\b/g, "θ"],
+  [/W\/W₀/g, "σ/σ̄"], [/F\/W₀/g, "τ/σ̄"], [/F\/W/g, "τ/σ"], [/W₀/g, "σ̄"], [/\bA − B\b/g, "a − b"], [/\bage\b/g, "θ"],
 ];
 
 /** A label of the page in the chosen names. */
