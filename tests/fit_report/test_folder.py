@@ -51,6 +51,9 @@ def test_the_folder_has_page_json_and_material(fitted, tmp_path):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 2
     assert "&lt;readings&gt;" in page
+    # The table of the data is in SI.
+    assert "V (m/s)<" in page
+    assert "frequency (Hz)<" in page
     (shown,) = re.findall(r"<td>lambda</td><td>([\d.]+)</td>.*<td>nm</td>", page)
     assert 1e-9 * float(shown) == pytest.approx(estimate.value, abs=estimate.se / 10)
     # Nothing is fetched: no address outside the page in any attribute that loads.

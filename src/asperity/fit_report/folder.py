@@ -165,8 +165,14 @@ def _figures(fit: Fit, posterior: Posterior | None, names: Names) -> str:
 
 
 def data_tables(fit: Fit) -> str:
-    """The data of a fit: readings of a table, drive and noise of a recording."""
+    """The data of a fit: readings of a table in SI, drive and noise of a recording."""
     parts = []
+    known = point_parameters(fit.objective.law)
+
+    def heading(name: str) -> str:
+        unit = known[name].unit if name in known else "rad" * name.startswith("phase")
+        return f"{symbol(name)} ({unit})" if unit else symbol(name)
+
     for term in fit.objective.terms_of(LockInTerm):
         read = term.table
         columns: dict[str, Any] = {**read.points}
@@ -176,7 +182,7 @@ def data_tables(fit: Fit) -> str:
             (str(read.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
             for i in range(read.rows)
         ]
-        parts.append(html_table(("", *columns), rows))
+        parts.append(html_table(("", *map(heading, columns)), rows))
     parts += [_recording(term) for term in fit.objective.terms_of(RunTerm)]
     return "\n".join(parts)
 
