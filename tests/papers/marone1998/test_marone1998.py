@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import asperity_papers.marone1998 as package
 from asperity import materials
+from asperity.errors import InputError
 from asperity.ledger import Paper, altered
 from references.memory_tests import Interface
 
@@ -191,3 +192,5 @@ def test_a_figure_follows_changed_numbers(capsys):
     np.testing.assert_allclose(slope, -0.006, rtol=1e-9)
     exec(compile(figure.python(changes), "figure-05", "exec"), {})
     assert "static" in capsys.readouterr().out
+    with pytest.raises(InputError, match="reach the end of the figure, got the slider ran away"):
+        PAPER.tab["figure-02"].lines(altered(PAPER.numbers, {"k_2": 2e-4}))
