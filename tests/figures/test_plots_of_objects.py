@@ -12,7 +12,9 @@ import asperity as asp
 from asperity.errors import InputError
 from asperity.figures.plot import Plot
 from asperity.figures.recording import draw_amplitudes
+from asperity.figures.slice import _in_si
 from asperity.loads import Hold, Programme, Slide
+from asperity.units import KINDS
 
 PMMA = asp.materials.load("bureau2000")
 SLIDER = asp.Slider(PMMA.law("rice-ruina"), spring="0.2 N/um", load=PMMA.W0)
@@ -162,3 +164,8 @@ def test_a_described_figure_has_arrows_and_texts_at_named_angles() -> None:
     assert [text.get_rotation() for text in texts] == [330.0, 90.0]
     assert texts[0].get_text() == "falls by 0.2"
     assert axis.get_lines()[0].get_linestyle() == "-"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_position_on_an_axis_of_any_kind_is_read(kind) -> None:
+    assert _in_si(KINDS[kind].example, KINDS[kind].si or "1", "axis") > 0

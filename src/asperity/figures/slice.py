@@ -107,7 +107,7 @@ def plot_slice(
 
 def _in_si(value: Any, unit: str, dim: str) -> float:
     """A position in SI; a text has its unit, or is a number in SI."""
-    kind = next(name for name, kind in KINDS.items() if kind.si == unit.removeprefix("1"))
+    kind = next(name for name, kind in KINDS.items() if (kind.si or "1") == unit)
     with suppress(ValueError):
         value = float(value)
     try:
