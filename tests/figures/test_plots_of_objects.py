@@ -35,12 +35,18 @@ def test_curves_are_the_numbers_of_the_response_and_unstable_points_are_open() -
             )
 
 
-def test_a_point_that_failed_is_a_gap() -> None:
+def test_points_in_any_order_are_drawn_from_left_to_right_and_one_that_failed_is_a_gap() -> None:
     response = asp.periodic_response(
-        SLIDER, velocity="1 um/s", epsilon=[0.1, 0.9999, 0.24], frequency=120.0
+        SLIDER, velocity="1 um/s", epsilon=[0.24, 0.1, 0.9999, 0.01], frequency=120.0
     )
-    assert list(response.converged) == [True, False, True]
-    assert np.isnan(response.plot().axes[0].get_lines()[0].get_ydata()[1])
+    assert list(response.converged) == [True, True, False, True]
+    figure = response.plot()
+    curve, unstable = figure.axes[1].get_lines()
+    assert curve.get_xdata().tolist() == [0.01, 0.1, 0.24, 0.9999]
+    np.testing.assert_array_equal(curve.get_ydata(), response.mu1[[3, 1, 0, 2]])
+    assert unstable.get_xdata().tolist() == [0.01, 0.1]
+    assert [axis.get_xlabel() for axis in figure.axes] == ["", "", ""]
+    assert figure.get_supxlabel().startswith("relative amplitude of the load")
 
 
 def test_a_single_point_is_a_cycle_of_the_harmonic_sum() -> None:

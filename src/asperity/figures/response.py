@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from asperity.errors import require
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from asperity.orbit import PeriodicResponse
     from asperity.transients.limit_cycle import LimitCycle
 
+#: Largest number of characters of a line above the panels.
+_LINE = 100
 #: Largest number of curves in a panel.
 _MOST_CURVES = 8
 #: Name, label and unit of the quantity of each panel.
@@ -53,7 +57,8 @@ def draw_response(response: PeriodicResponse) -> Figure:
         return _cycle(response)
     data = response.to_dataset().squeeze()
     _require_rows(data.mean_friction.shape, "one point, a row of points", "asperity.map")
-    return _curves(data, response.slider.law.name, _PERIODIC, ~data.stable.values)
+    unstable = data.converged.values & ~data.stable.values
+    return _curves(data, response.slider.law.name, _PERIODIC, unstable)
 
 
 def draw_stick_slip_response(response: StickSlip) -> Figure:
@@ -145,14 +150,12 @@ def _cycle(response: PeriodicResponse) -> Figure:
         # The first harmonic of the load says nothing of a modulation that leaves it out.
         if name != "ε" or isinstance(response.load, Harmonic) or np.any(value)
     )
-    state = "stable" if response.stable.item() else str(response.result.item())
-    if response.converged.item() and not response.stable.item():
-        state = "unstable"
-    figure.suptitle(
-        f"{response.slider.law.name}: {point}; {state}, "
-        f"mean {mean:.4g}, without modulation {steady:.4g}",
-        fontsize="small",
-    )
+    state = "stable" if response.stable.item() else "unstable"
+    state += f", mean {mean:.4g}, without modulation {steady:.4g}"
+    if not response.converged.item():
+        state = fill(str(response.result.item()), _LINE)
+    separator = "; " if response.converged.item() else "\n"
+    figure.suptitle(f"{response.slider.law.name}: {point}{separator}{state}", fontsize="small")
     return figure
 
 
@@ -170,17 +173,18 @@ def _curves(
     side = data[along] if along in data.coords else None
     unit = (1.0, "") if side is None else axis_unit(side)
     x = np.arange(data.sizes[along]) if side is None else side.values / unit[0]
+    order = np.argsort(x, kind="stable")
+    x, rows = x[order], rows.isel({along: order})
     shape = rows[shown[0][0]].shape
-    opened = np.zeros(shape, bool) if unstable is None else unstable.reshape(shape)
+    opened = np.zeros(shape, bool) if unstable is None else unstable.reshape(shape)[:, order]
     for panel, (name, text, scale) in zip(panels, shown, strict=True):
         for i in range(rows.sizes[across]):
             row = rows.isel({across: i})
             y = row[name].values / scale
             (line,) = panel.plot(x, y, label=_row_label(row, across))
-            open_ = opened[i] & np.isfinite(y)
             look = {"color": line.get_color(), "fillstyle": "none", "markersize": 3}
-            panel.plot(x[open_], y[open_], "o", **look)
-        panel.set(xlabel=along if side is None else label(side, unit), ylabel=text)
+            panel.plot(x[opened[i]], y[opened[i]], "o", **look)
+        panel.set_ylabel(text)
         if x.min() > 0 and x.max() > 30 * x.min():
             panel.set_xscale("log")
         if unstable is None and np.nanmax(rows[name]) > 30 * np.nanmin(rows[name]):
@@ -192,6 +196,9 @@ def _curves(
         panels[2].plot([], [], "o", color=GREY, fillstyle="none", markersize=3, label="unstable")
         panels[2].legend(handles=panels[2].get_lines()[-1:], fontsize="small")
     figure.suptitle(law, fontsize="small")
+    # A label below each panel is wider than the panel.
+    name = along if side is None else label(side, unit)
+    figure.supxlabel(name, fontsize=rcParams["axes.labelsize"])
     return figure
 
 
