@@ -120,6 +120,8 @@ def test_grids_have_names(tmp_path):
     assert dict(data.sizes) == {"K": 2, "hold_time": 3}
     assert data.healing.attrs["units"] == "1"
     assert data.velocity.item() == V0
+    assert all({"units", "long_name"} <= set(c.attrs) for c in data.coords.values())
+    assert data.velocity.attrs["long_name"] == "velocity of the drive"
     data.to_netcdf(tmp_path / "holds.nc")
     steps = step_response(
         law("rice-ruina"), velocity_before=V0, velocity=[1e-5, 1e-7], stiffness="1 1/um"

@@ -71,7 +71,7 @@ class _Memory(Labelled):
     stable: Bool = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
     slider: Slider
-    velocity: Float = measured("m/s")
+    velocity: Float = measured("m/s", "velocity of the drive", drive=True)
 
     def outcomes(self) -> str:
         """Number of points, and number of those that do not settle."""
@@ -124,7 +124,7 @@ class Holds(_Memory):
 
     shown = ("healing", "healing_rate", "relaxation", "hold_slip", "settling_slip")
 
-    hold_time: Float = measured("s")
+    hold_time: Float = measured("s", "duration of the hold", drive=True)
     level: Float = measured("1", "F/W0 of steady sliding")
     minimum: Float = measured("1", "F/W0 at the end of the hold")
     maximum: Float = measured("1", "static friction: F/W0 at the maximum after the hold")
@@ -168,7 +168,7 @@ class VelocityStepResponse(_Memory):
 
     shown = ("direct", "evolution", "settling_slip")
 
-    velocity_before: Float = measured("m/s")
+    velocity_before: Float = measured("m/s", "velocity of the drive before the step", drive=True)
     before: Float = measured("1", "F/W0 of steady sliding before the step")
     extremum: Float = measured("1", "F/W0 at the first extremum after the step")
     after: Float = measured("1", "F/W0 of steady sliding after the step")

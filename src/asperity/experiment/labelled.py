@@ -27,9 +27,9 @@ def shaped(array: Any, shape: tuple[int, ...]) -> Any:
     return array.reshape((*shape, *array.shape[1:]))
 
 
-def measured(unit: str, meaning: str = "") -> Any:
-    """A field of a `Labelled` record; a quantity of the drive has a unit but no meaning."""
-    return field(metadata={"unit": unit, "meaning": meaning})
+def measured(unit: str, meaning: str, *, drive: bool = False) -> Any:
+    """A field of a `Labelled` record: a result, or a quantity of the drive (a coordinate)."""
+    return field(metadata={"unit": unit, "drive" if drive else "meaning": meaning})
 
 
 class Labelled(Displayed):
@@ -78,9 +78,12 @@ class Labelled(Displayed):
 
         shape = self.result.shape
         values = {
-            f.name: (np.asarray(getattr(self, f.name)), {"units": f.metadata["unit"]})
+            f.name: (
+                np.asarray(getattr(self, f.name)),
+                {"units": f.metadata["unit"], "long_name": f.metadata["drive"]},
+            )
             for f in fields(self)  # type: ignore[arg-type]
-            if f.metadata.get("meaning") == ""
+            if "drive" in f.metadata
         }
         law: type[Law] = type(self.slider.law)
         known = {**law_parameters(law), **MACHINE}

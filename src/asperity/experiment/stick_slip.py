@@ -55,7 +55,7 @@ class StickSlip(Labelled, Drawn):
     shown = ("period", "drop", "slip_duration", "peak_velocity")
     _drawn_by = "asperity.figures.response:draw_stick_slip_response"
 
-    velocity: Float = measured("m/s")
+    velocity: Float = measured("m/s", "velocity of the drive", drive=True)
     period: Float = measured("s", "period of stick-slip")
     drop: Float = measured("1", "largest less smallest F/W0")
     peak: Float = measured("1", "largest F/W0")

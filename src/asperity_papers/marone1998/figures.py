@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from asperity import Slider, materials, transient
-from asperity.errors import require
+from asperity import InputError, Slider, materials, transient
 from asperity.ledger import FigureNumbers, PaperFigure, figure_words
 from asperity.loads import Programme, Slide
 from asperity.materials import Material
@@ -39,8 +38,9 @@ def figure_2(laboratory: Laboratory) -> FigureNumbers:
         )
         time = np.unique(np.concatenate([a + share * s for a, s in zip(ends, spans, strict=False)]))
         run = transient(slider, programme, sampling=time)
-        rule, got = "reach the end of the figure", str(run.stopped).partition(":")[0]
-        require(run.stopped is None, f"the motion of {name}", rule, got, "stiffen the spring")
+        if run.stopped is not None:
+            rule, got = "reach the end of the figure", run.stopped.partition(":")[0]
+            raise InputError(f"the motion of {name}", rule, got, "stiffen the spring")
         friction = run.force - run.force[0]
         load = np.interp(run.time, ends, way) - 2
         peaks[f"peak {letter}"] = float(friction.max())
