@@ -265,17 +265,6 @@ def test_for_vanishing_mass_and_damping_the_response_is_quasi_static(elastic):
             assert gap[0] / gap[1] == pytest.approx(2, abs=0.15)
 
 
-def test_without_modulation_the_mean_does_not_change_under_damping():
-    system, eta, V = slider(False), 5e3, 1e-4
-    response = asp.periodic_response(
-        system, velocity=V, epsilon=[0.0, 0.01], frequency=120.0, radiation_damping=eta
-    )
-    steady = float(system.law.mu_ss(V)) + eta * V / float(system.W0)
-    assert response.mu_ss == pytest.approx(steady * np.ones(2))
-    assert response.delta_mu[0] == pytest.approx(0.0, abs=1e-12)
-    assert response.delta_mu[1] < 0
-
-
 def test_a_sampled_period_is_the_modulation_it_was_sampled_from():
     theta, samples = np.linspace(0, 7, 50), np.arange(64) * 2 * np.pi / 64
     built = modulated(0.3, load={2: (0.1, 0.7)}, pull=0.2, pull_phase=-1.0)

@@ -15,6 +15,7 @@ from jax.typing import ArrayLike
 
 from asperity._processes import available_cores, process_count
 from asperity.errors import require
+from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.response import PeriodicResponse
@@ -29,7 +30,7 @@ from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.parameters import DRIVE
 from asperity.parameters.arguments import at_least, counted, typed
-from asperity.slider import Motion, QuasiStatic, Slider
+from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_problem, flatten
 
 
@@ -134,14 +135,13 @@ def periodic_response(
     else:
         solution = _proportional(flat, points, options)
         options.progress(points)
-    mu_ss = np.asarray(_steady_force(problem.system)) * np.ones(shape)
+    mu_ss = np.asarray(_mu_ss(slider.law, problem.system.V)) * np.ones(shape)
     return PeriodicResponse.from_search(solution, shape, mu_ss, *problem)
 
 
 @jax.jit
-def _steady_force(motion: Motion) -> Array:
-    """F/W0 without modulation: friction and radiation damping."""
-    return motion.slider.law.mu_ss(motion.V) + motion.damping
+def _mu_ss(law: Law, V: ArrayLike) -> Array:
+    return law.mu_ss(V)
 
 
 def _proportional(problem: Problem, points: int, options: SearchOptions) -> Solution:

@@ -51,10 +51,9 @@ class PeriodicResponse(Drawn):
     mean_friction : array, shape (...)
         Mean of F/W0.
     delta_mu : array, shape (...)
-        mean_friction - mu_ss: negative where modulation lowers friction.
+        mean_friction - mu_ss(V): negative where modulation lowers friction.
     mu_ss : array, shape (...)
-        F/W0 of unmodulated steady sliding at V: its friction coefficient, and the force of
-        radiation damping where the equations have one.
+        Friction coefficient of unmodulated steady sliding.
     harmonics : complex array, shape (..., count)
         c_1, c_2, ...
     mode, mode_frequency, growth_rate : array, shape (...)

@@ -16,7 +16,6 @@ from asperity.inference import HealingTable, LockInTable, fit, read_table, table
 from asperity.inference.answers import read_data
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.residuals import outlying_rows, standardised
-from asperity.inference.tables.term import _steady
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.record import modulated_record
 from asperity.questions.fit import Data, Fit
@@ -290,16 +289,6 @@ def test_unstable_responses_are_no_readings(pmma):
         assert result.values["A"] == pytest.approx(float(law.A), rel=1e-3)
         said = [w for w in result.warnings if "9 of 9 rows is unstable" in w]
         assert len(said) == (name == "-")
-
-
-def test_friction_without_modulation_counts_the_damping_of_a_fit():
-    V, W0, eta = np.array([1e-6, 1e-4]), 7.0, 5e3
-    numbers = {"mu0": 0.5, "A": 0.01, "B": 0.02, "D0": 4e-7, "V0": 1e-6, "W0": W0, "eta": eta}
-    given = {name: np.full(2, value) for name, value in numbers.items()} | {"V": V}
-    value, slopes = _steady(asp.laws.RiceRuina, given, 4)
-    assert value == pytest.approx(0.5 - 0.01 * np.log(V / 1e-6) + eta * V / W0)
-    assert slopes["eta"] == pytest.approx(V / W0)
-    assert slopes["W0"] == pytest.approx(-eta * V / W0**2)
 
 
 @pytest.mark.parametrize(("name", "option"), [("inertia", "inertia"), ("eta", "radiation_damping")])

@@ -476,15 +476,13 @@ def on_contacts(parameters: Mapping[str, Any]) -> dict[str, Any]:
 def _steady(
     law: type[Law], given: Mapping[str, Float], compiled: int
 ) -> tuple[Float, dict[str, Float]]:
-    """`steady_friction` at each row and its derivatives in its parameters.
+    """mu_ss(V) at each row and its derivatives in the parameters of the law.
 
     The program is compiled for `compiled` rows.
     """
     rows = len(given["V"])
-    damping = ("W0", "eta") if "eta" in given else ()
     padded = {
-        p: np.pad(given[p], (0, compiled - rows), "edge")
-        for p in (*law_parameters(law), "V", *damping)
+        p: np.pad(given[p], (0, compiled - rows), "edge") for p in (*law_parameters(law), "V")
     }
     value, slopes = _steady_slopes(padded, law=law)
     return np.asarray(value)[:rows], {n: np.asarray(s)[:rows] for n, s in slopes.items()}
@@ -502,9 +500,8 @@ def _steady_slopes(given: Mapping[str, Array], *, law: type[Law]) -> tuple[Array
 
 
 def steady_friction(law: type[Law], given: Mapping[str, Array]) -> Array:
-    """F/W0 without modulation at each row: friction and, with eta, radiation damping."""
-    friction = law_from(law, given).mu_ss(given["V"])
-    return friction + given["eta"] * given["V"] / given["W0"] if "eta" in given else friction
+    """mu_ss(V) at each row, for parameters of shape (rows,)."""
+    return law_from(law, given).mu_ss(given["V"])
 
 
 @dataclass(frozen=True)
