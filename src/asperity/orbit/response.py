@@ -51,7 +51,8 @@ class PeriodicResponse(Drawn):
     mean_friction : array, shape (...)
         Mean of F/W0.
     delta_mu : array, shape (...)
-        mean_friction - mu_ss(V): negative where modulation lowers friction.
+        mean_friction - mu_ss: negative where modulation lowers friction. Without modulation it is
+        the force of radiation damping, eta V/W0, if the equations have one.
     mu_ss : array, shape (...)
         Friction coefficient of unmodulated steady sliding.
     harmonics : complex array, shape (..., count)
