@@ -262,9 +262,10 @@ def compare(
                 for key, values in given.items()
             }
             if before and before[name].converged:
-                # Nearly the same data.
+                # Nearly the same data, or the lower minimum of a law that extends this one.
                 mine["start"] = {n: before[name].values[n] for n in names}
-                most = _STARTS_WITHOUT_OUTLIERS
+                far_off = before[name].law != name and before[name].p_value < FAR_OFF
+                most = 0 if far_off else _STARTS_WITHOUT_OUTLIERS
                 mine["starts"] = min(most, options.get("starts", most))
             internal: dict[str, Any] = {
                 "bare": True,
