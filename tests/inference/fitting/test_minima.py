@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asperity.inference.fitting import minima
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.estimated_noise import with_noise
 from asperity.inference.fitting.fit import with_estimated_errors
@@ -549,6 +550,41 @@ def test_a_search_on_few_rows_leads_to_the_minimum_of_all():
     assert chi2 == pytest.approx(exact[1], rel=1e-9)
     # All rows are computed at the end only.
     assert sum(n == rows for n in term.computed) < 0.2 * len(term.computed)
+
+
+def test_larger_uncertainties_that_the_law_contradicts_too_lead_to_no_further_minimisation(
+    monkeypatch,
+):
+    """Nor do they a second time to the same minimum."""
+    rows = 32
+
+    def values(x):
+        return np.full(rows, 60.0) + 5 * (x - FIRST), np.full(rows, 5.0)
+
+    def minimisations(share):
+        """Numbers of minimisations with larger uncertainties, and from their minima."""
+        calls = []
+
+        def smoother(self):
+            part = Rows(lambda x: [share * v for v in values(x)], 0, self.kept)
+            part.searching = part.smooth = True
+            return part
+
+        def counted(objective, start, evaluations=60):
+            calls.append(hasattr(objective.terms[0], "smooth"))
+            return rough_minimum(objective, start, evaluations)
+
+        monkeypatch.setattr(Rows, "smoother", smoother)
+        monkeypatch.setattr(minima, "_rough_minimum", counted)
+        priors = {"D0": Prior(1e-6, 1e-8, "measured")}
+        unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={}, priors=priors)
+        minima_of(Objective((Rows(values, rows),), LAW, unknowns, {}), 0)
+        return calls.count(True), calls.count(False)
+
+    rough_minimum = minima._rough_minimum
+    far_off, near = minimisations(0.5), minimisations(1e-3)
+    assert far_off[0] == near[0] == 6
+    assert near[1] == far_off[1] + 1
 
 
 def test_the_given_start_is_minimised_even_if_four_rows_are_far_off_there():

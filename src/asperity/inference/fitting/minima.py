@@ -10,7 +10,7 @@ milliseconds a row: the first minimisations then use few rows of the table on a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from operator import attrgetter
 
@@ -173,10 +173,23 @@ def _further(
     return [u for u in order if u.tobytes() not in taken]
 
 
-def _by_way_of_smoother(objective: Objective, start: Float) -> Minimum:
-    """The rough minimum from a start, by way of that with larger uncertainties."""
-    between = _rough_minimum(objective.smoother(), start, _EVALUATIONS // 2)
-    return _rough_minimum(objective, between.u)
+def _by_way_of_smoother(objective: Objective, starts: Sequence[Float]) -> Iterator[Minimum]:
+    """Rough minima from starts, by way of those with larger uncertainties.
+
+    Larger uncertainties make chi-squared lower everywhere. A minimum at which the law is far off
+    even with them leads to none that describes the data, and one that repeats another leads to the
+    same.
+    """
+    smoother, before = objective.smoother(), list[Minimum]()
+    for start in starts:
+        between = _rough_minimum(smoother, start, _EVALUATIONS // 2)
+        if not math.isfinite(between.chi2) or not _is_new(between, before):
+            continue
+        before.append(between)
+        # A minimisation may end before the minimum.
+        lowest = between.chi2 - smoother.expected_decrease(between.u)
+        if not _far_off(smoother, between._replace(chi2=lowest)):
+            yield _rough_minimum(objective, between.u)
 
 
 def _describes(
@@ -269,12 +282,12 @@ def _by_few_rows(
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
-    for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
-        if _describes(coarse, roughly):
-            break
-        new = _by_way_of_smoother(coarse, start)
+    further = _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]
+    for new in _by_way_of_smoother(coarse, [] if _describes(coarse, roughly) else further):
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
+        if _describes(coarse, roughly):
+            break
     # A law that is far off for few rows does not describe all of them.
     far_off = bool(roughly) and _far_off(coarse, roughly[0])
     minima = _on_all_rows(objective, roughly, far_off=far_off)

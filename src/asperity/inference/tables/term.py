@@ -262,7 +262,7 @@ class LockInTerm(DataTerm):
             elif not name.startswith("mu") and "mu1" in values:
                 size = np.full(column.size, np.nanmedian(values["mu1"]))
             errors[name] = np.hypot(errors[name], _SMOOTHING * size)
-        return self.with_table(replace(self.table, errors=errors, covariances={}))
+        return self.with_table(replace(self.table, errors=errors))
 
     @property
     def _count(self) -> int:
