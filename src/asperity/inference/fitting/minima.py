@@ -186,9 +186,7 @@ def _by_way_of_smoother(objective: Objective, starts: Sequence[Float]) -> Iterat
         if not math.isfinite(between.chi2) or not _is_new(between, before):
             continue
         before.append(between)
-        # A minimisation may end before the minimum.
-        lowest = between.chi2 - smoother.expected_decrease(between.u)
-        if not _far_off(smoother, between._replace(chi2=lowest)):
+        if not _far_off(smoother, between):
             yield _rough_minimum(objective, between.u)
 
 
