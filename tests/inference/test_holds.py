@@ -77,6 +77,29 @@ def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise, fitte
         mine, known = done.parameters[name], given.parameters[name]
         assert mine.value == pytest.approx(known.value, rel=1e-3)
         assert mine.se == pytest.approx(known.se * expected / ERROR, rel=0.02)
+    # AICc compares maxima of the likelihood: their error is that of all rows.
+    n, k = 2 * TIMES.size, 4
+    maximum = n * (1 + np.log(2 * np.pi * term.error**2 * (n - k + 1) / n))
+    assert done.aicc == pytest.approx(maximum + 2 * k + 2 * k * (k + 1) / (n - k - 1), rel=1e-9)
+
+
+def test_priors_leave_the_estimated_error_as_it_is(exact, noise, fitted):
+    """A tight prior leaves the residuals the degrees of freedom that a fixed number does.
+
+    The error was estimated where a guess of it, far too large, had let the prior decide.
+    """
+    data, begun = table(exact, exact[1] + noise), fitted.values
+
+    def with_prior(mean, sd):
+        done = fit(data, "rice-ruina", prior={"A": Prior(mean, sd, "")}, start=begun, starts=0)
+        return done.objective.terms[0].error, done
+
+    (wide, _), (without, _) = with_prior(A + 1.5e-3, 1e-3), with_prior(A, 1.0)
+    assert wide == pytest.approx(without, rel=0.02)
+    _, tight = with_prior(A, 1e-7)
+    assert np.sum(tight.residuals[0].values ** 2) == pytest.approx(2 * TIMES.size - 2, rel=1e-4)
+    low, high = tight.parameters["A"].interval_95
+    assert high - low == pytest.approx(2 * 1.96e-7, rel=1e-3)
 
 
 def test_an_error_is_an_uncertainty_too_as_in_lock_in_tables(tmp_path):

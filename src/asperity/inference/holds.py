@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Float
 from asperity.errors import Argument, InputError, require
-from asperity.inference.objective import DataTerm, Residuals
+from asperity.inference.objective import DataTerm, Residuals, log_density
+from asperity.inference.tables.residuals import leverages
 from asperity.inference.tables.table import in_all_rows
 from asperity.inference.tables.term import outlier_sentence
 from asperity.laws import Law
@@ -222,8 +223,8 @@ _ROWS = 32
 class HoldTerm(DataTerm):
     """A table of holds as a `DataTerm` of an objective.
 
-    If the table has no errors, one `error` for all rows is used: at first a guess, which does not
-    change the estimates, and then the standard deviation of the residuals.
+    If the table has no errors, one `error` for all rows is used: at first a guess, which changes
+    the estimates only if there are priors, and then the standard deviation of the residuals.
 
     Parameters
     ----------
@@ -264,14 +265,20 @@ class HoldTerm(DataTerm):
         model = "independent, normal, one error for all holds, estimated from the residuals"
         return {"model": model, **rows, "error": self.error}
 
-    def estimate_error(self, values: Mapping[str, float], parameters: int) -> None:
-        """Set the error by the residuals at an estimate of so many parameters."""
-        residuals = self.residuals(values)
-        freedom = self.table.rows - parameters
-        if not self.profiled or residuals is None or freedom < 1:
-            return
-        self.error *= max(math.sqrt(float(np.sum(residuals.values**2)) / freedom), 1e-12)
-        self._freedom = float(freedom)
+    def estimate_error(self, residuals: Residuals, information: Float) -> float:
+        """Set the error by the residuals at an estimate; the factor by which it has changed.
+
+        Parameters
+        ----------
+        residuals : Residuals
+        information : array, shape (coordinates, coordinates)
+            Information matrix of table and priors: a parameter that its prior determines leaves
+            the residuals as a fixed one does.
+        """
+        self._freedom = self.table.rows - float(leverages(residuals, information).sum())
+        factor = math.sqrt(float(np.sum(residuals.values**2)) / self._freedom)
+        self.error *= max(factor, 1e-12)
+        return factor
 
     def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Residuals in standard uncertainties; None where a hold has no solution."""
@@ -299,9 +306,24 @@ class HoldTerm(DataTerm):
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """As in `DataTerm`: the covariance scales with the square of an estimated error."""
-        spread = 2 * np.diag(covariance) ** 2 / self._freedom
-        return np.zeros_like(covariance), spread
+        """As in `DataTerm`: that of the table scales with the square of an estimated error."""
+        residuals = self.residuals(values)
+        assert residuals is not None  # there is a solution at the estimate
+        along = (residuals.jacobian * slopes) @ covariance
+        return np.zeros_like(covariance), 2 / self._freedom * np.sum(along**2, axis=0) ** 2
+
+    def log_likelihood(self, residuals: Residuals) -> float:
+        """As in `DataTerm`: with the error of the largest likelihood, of all rows.
+
+        The likelihoods of AICc and BIC are maxima. The error of the intervals is larger, by the
+        number of parameters that were fitted to the same rows.
+        """
+        if not self.profiled:
+            return log_density(residuals)
+        values, n = residuals.values, self.table.rows
+        factor = max(math.sqrt(float(values @ values) / n), 1e-12)
+        log_scale = residuals.log_scale + n * math.log(factor)
+        return log_density(residuals._replace(values=values / factor, log_scale=log_scale))
 
     def observed(self) -> Mapping[str, Float]:
         """Holds and healing."""

@@ -127,6 +127,10 @@ class DataTerm(ABC):
             derivatives with respect to these, in this order; zeros without dependence.
         """
 
+    def log_likelihood(self, residuals: Residuals) -> float:
+        """Logarithm of the density of the data at the estimate."""
+        return log_density(residuals)
+
     def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
         """Sums of the squared residuals at many sets of parameters, without derivatives.
 

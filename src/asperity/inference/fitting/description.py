@@ -31,7 +31,6 @@ from asperity.inference.objective import (
     Objective,
     Residuals,
     aicc_penalty,
-    log_density,
 )
 from asperity.inference.tables.residuals import (
     DESCRIBED,
@@ -268,7 +267,8 @@ def _fit_with(
     rivals: Sequence[tuple[Float, float]],
 ) -> Fit:
     """The record of a fit, without its warnings."""
-    deviance = -2 * float(sum(log_density(d) for d in at.data))
+    pairs = zip(objective.terms, at.data, strict=True)
+    deviance = -2 * sum(term.log_likelihood(d) for term, d in pairs)
     n, k = at.readings, at.fitted
     return Fit(
         law=objective.law.name,

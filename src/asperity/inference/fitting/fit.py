@@ -39,6 +39,8 @@ from asperity.parameters.arguments import at_least, typed
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
+#: Largest number of rounds of estimating the error of holds; the relative change that ends them.
+_ROUNDS, _AGREED = 30, 1e-6
 
 
 @typed
@@ -198,12 +200,19 @@ def fit(
 
 def with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
     """Minima with errors that depend on a fit, best first: of holds without errors, of epsilon."""
-    values = objective.named(minima[0].u)
-    for hold in objective.terms_of(HoldTerm):
-        hold.estimate_error(values, len(objective.unknowns))
+    u = minima[0].u
+    for hold in objective.terms_of(HoldTerm) if not objective.noise_is_known else ():
+        # With priors the estimates depend on the error, and the error on the estimates.
+        for _ in range(_ROUNDS):
+            (data,), (_, J) = objective.data_residuals(u) or (), objective.residuals(u)
+            changed = hold.estimate_error(data, J.T @ J)
+            objective.forget()
+            u = objective.minimise(u).u
+            if abs(changed - 1) < _AGREED:
+                break
     for table in objective.terms_of(LockInTerm):
         if table.measured_epsilon:
-            table.estimate_error(values)
+            table.estimate_error(objective.named(u))
     objective.forget()
     return sorted((objective.minimise(m.u) for m in minima), key=attrgetter("chi2"))
 
