@@ -25,6 +25,7 @@ from asperity.errors import InputError
 from asperity.inference import answers, compare, fit, table_of
 from asperity.inference.comparison.compare import judge, laws_table
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
+from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.residuals import outlying_rows
 from asperity.laws import get_law
@@ -472,8 +473,15 @@ def _fit_with(law, run, friction, aicc=0.0, **about):
     white = Autoregression(np.zeros(0), 1e-6)
     term = _Motion(run=run, name=run.name, models=[white], doubts=(), basis=None)
     vars(term).update(about)
-    objective = SimpleNamespace(terms_of=lambda kind: [term])
-    return SimpleNamespace(law=law, values={"friction": friction}, aicc=aicc, objective=objective)
+    data = residuals_at((run.friction - friction) / 1e-3)
+    parts = [(term, data)]
+    return SimpleNamespace(
+        law=law, values={"friction": friction}, aicc=aicc, residuals=(data,), parts=lambda _: parts
+    )
+
+
+def residuals_at(values):
+    return Residuals(values, np.empty((values.size, 0)), np.array([]), np.array([]), 0.0)
 
 
 @pytest.mark.parametrize(("jumps", "doubted"), [((), False), ((41.0,), True), ((70.0,), False)])
@@ -526,3 +534,18 @@ def test_a_verdict_that_changes_with_the_window_says_so_first():
     doubt, _ = support(best, other)
     assert "changes with the window: the second half of run alone is for poor, by 40" in doubt
     assert "first half" not in doubt
+
+
+def test_a_stretch_of_one_recording_has_no_part_in_what_another_decides():
+    """A second recording alone tells the laws apart; the first is for the other law."""
+    time = np.linspace(0, 100, 2001)
+    run = _Run(name="run", time=time, friction=np.full(2001, 0.6), jumps=(), stretches=[(0, 2001)])
+    for late, of_second, doubts in ((0.6002, 500.8, ""), (0.61, 3000.0, "run alone is for poor")):
+        best = _fit_with("good", run, np.where(time > 99, late, 0.6))
+        poor = _fit_with("poor", run, run.friction, 500.0 if not doubts else 1000.0)
+        best.residuals += (residuals_at(np.zeros(1)),)
+        poor.residuals += (residuals_at(np.array([of_second**0.5])),)
+        doubt, stretch = support(best, poor)
+        assert "run" not in stretch
+        assert "rests on" not in doubt
+        assert (doubts in doubt) if doubts else not doubt

@@ -20,7 +20,7 @@ import numpy as np
 from asperity.arrays import Bool, Float
 from asperity.errors import Argument
 from asperity.inference.fitting.result import Fit
-from asperity.inference.objective import log_density
+from asperity.inference.objective import Residuals, log_density
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.term import RunTerm
@@ -236,19 +236,29 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
         Empty if there are none.
     """
     doubts, stretches = [], []
-    pairs = zip(best.objective.terms_of(RunTerm), other.objective.terms_of(RunTerm), strict=True)
-    for first, second in pairs:
+    behind = other.aicc - best.aicc
+    apart = _deviance(*other.residuals) - _deviance(*best.residuals)
+    pairs = zip(best.parts(RunTerm), other.parts(RunTerm), strict=True)
+    for (first, ours), (second, theirs) in pairs:
         name, time = first.name, first.run.recorded_times(first.run.time)
+        # The part of the difference of AICc that this recording has among all data.
+        gain = behind - (apart - (_deviance(theirs) - _deviance(ours)))
+        doubts += [f"even under {best.law} {doubt}" for doubt in first.doubts]
+        if gain <= -EXCLUDED:
+            doubts.append(f"{name} alone is for {other.law}, by {-gain:.3g} in AICc")
         edges, total = _gains(first, best, second, other)
-        begin, end, _ = _shortest(edges, total, _MOST, time)
+        if gain <= 0 or not total[-1] > 0:
+            continue
+        total = total / total[-1]
+        begin, end, _ = _shortest(edges, total, _MOST * behind / gain, time)
         span = f"{begin:.4g} to {end:.4g} s of {name}"
-        whole, behind = float(time[-1] - time[0]), other.aicc - best.aicc
-        a, b, share = _shortest(edges, total, 1 - EXCLUDED / max(behind, EXCLUDED), time)
+        whole = float(time[-1] - time[0])
+        a, b, share = _shortest(edges, total, max(behind - EXCLUDED, 0.0) / gain, time)
         if behind >= EXCLUDED and b - a <= _SHORT * whole:
             doubts.append(
                 f"it rests on {a:.4g} to {b:.4g} s of {name}, {(b - a) / whole:.1%} of the "
                 f"recording: without that stretch the AICc of {other.law} is "
-                f"{behind * (1 - share):.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
+                f"{behind - gain * share:.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
                 f"(compare without it: {Argument('window')})"
             )
         elif end - begin <= _SHORT * whole:
@@ -257,20 +267,24 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
                 f"{(end - begin) / whole:.1%} of it"
             )
         middle = len(edges) // 2
-        halves = {"first": behind * total[middle], "second": behind * (1 - total[middle])}
+        halves = {"first": gain * total[middle], "second": gain * (1 - total[middle])}
         doubts += [
             f"it changes with the window: the {half} half of {name} alone is for {other.law}, by "
-            f"{-gain:.3g} in AICc"
-            for half, gain in halves.items()
-            if gain <= -EXCLUDED
+            f"{-part:.3g} in AICc"
+            for half, part in halves.items()
+            if part <= -EXCLUDED
         ]
         jumps = first.run.recorded_times(first.run.jumps or ())
         inside = [f"{t:.4g} s" for t in jumps if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
-        doubts += [f"even under {best.law} {doubt}" for doubt in first.doubts]
     doubt = f"This verdict is doubtful: {'; '.join(doubts)}. " if doubts else ""
     return doubt, "".join(f" {sentence}." for sentence in stretches)
+
+
+def _deviance(*data: Residuals) -> float:
+    """-2 ln of the density of some data."""
+    return -2 * sum(map(log_density, data))
 
 
 def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Float, Float]:
@@ -291,7 +305,7 @@ def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Floa
     edges = np.linspace(0, run.time.size, min(_PARTS, run.time.size) + 1).astype(int)
     gains = np.add.reduceat(squares[1] - squares[0], edges[:-1])
     total = np.concatenate([[0.0], np.cumsum(gains)])
-    return edges, total / total[-1]
+    return edges, total
 
 
 def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[float, float, float]:
