@@ -316,10 +316,10 @@ def require_free_names(
 
 def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:
     """Published values of a material, by name in SI."""
-    return {n: number.si for n, number in _published(material, names).items()}
+    return {n: number.si for n, number in published_numbers(material, names).items()}
 
 
-def _published(material: Material | None, names: Iterable[str]) -> dict[str, Number]:
+def published_numbers(material: Material | None, names: Iterable[str]) -> dict[str, Number]:
     """Numbers of a material that have a value and are the kind of quantity of the parameter."""
     kinds = {n: p.kind for n, p in all_parameters(registered().values()).items()}
     numbers = {n: material[n] for n in names if n in material} if material is not None else {}
@@ -339,7 +339,7 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
         If the material has no number with an uncertainty for any of the names.
     """
     priors = {}
-    for name, published in _published(material, names).items():
+    for name, published in published_numbers(material, names).items():
         if published.uncertainty:
             sd, unit = float(published.si_uncertainty or 0), KINDS[published.dimension].si
             priors[name] = Prior(published.si, sd, material.name, unit)

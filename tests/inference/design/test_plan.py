@@ -50,6 +50,20 @@ def test_a_plan_is_read_in_SI():
     assert plan.noise["mu1"].at(np.array(1e-3)) == pytest.approx(np.hypot(2e-5, 1e-5))
 
 
+def test_the_uncertainty_of_a_material_is_one_of_the_parameter_s_kind(tmp_path):
+    """An uncertainty of 0.3, dimensionless, was one of 0.3 m."""
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        "title = 'x'\n[numbers.lambda]\nvalue = 0.6\nuncertainty = 0.3\nunit = ''\n"
+        "dimension = 'dimensionless'\nkind = 'assumed'\nplace = 'nowhere'\n"
+    )
+    values = {"lambda": "0.7 um", "eps_ratio": 0.5}
+    fixed = {"mu0": 0.4, "A": 0.013, "B": 0.02, "D0": "0.4 um", "V0": "1 um/s"}
+    fixed |= {"K": "0.2 N/um", "W0": "7 N"}
+    with pytest.raises(InputError, match="uncertainty must have a free parameter to draw"):
+        plan_of(changed(material=str(file), values=values, fixed=fixed, draws=4))
+
+
 def test_a_prior_of_the_stiffness_may_be_over_the_load():
     """7 N on a spring of 0.2 N/um."""
     free = {"free": ["lambda", "K"], "fixed": {"eps_ratio": 0.5}, "values": {"K": "0.2 N/um"}}

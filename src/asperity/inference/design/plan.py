@@ -22,7 +22,12 @@ from asperity.inference.fitting.inputs import (
 from asperity.inference.objective import Objective
 from asperity.inference.runs.assembly import stiffness_of_table
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
-from asperity.inference.unknowns import EPS_RATIO, require_free_names, unknowns_of
+from asperity.inference.unknowns import (
+    EPS_RATIO,
+    published_numbers,
+    require_free_names,
+    unknowns_of,
+)
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material, load as load_material
@@ -355,9 +360,9 @@ def _uncertainties(
         require(holds, "uncertainty", rule, f"'{name}'", "free it or leave it out")
         kind = known[name].kind
         given[name] = number(with_unit(value, kind, label), label, kind, "not negative")
-    for name in truth.names:
-        if material is not None and name in material and material[name].uncertainty:
-            given.setdefault(name, float(material[name].si_uncertainty or 0.0))
+    for name, published in published_numbers(material, truth.names).items():
+        if published.uncertainty:
+            given.setdefault(name, float(published.si_uncertainty or 0.0))
     rule = "have a free parameter to draw"
     require(given or not question.draws, "uncertainty", rule, "none", "add one, or leave draws out")
     return {n: given[n] for n in truth.names if n in given}
