@@ -1,6 +1,7 @@
 """Fits in several windows: their spread widens the intervals, and outlying windows are named."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -58,6 +59,21 @@ def test_a_warning_of_the_first_window_is_not_new_in_another(run, monkeypatch):
     result = fit_in_windows(run, run.friction)
     assert result.new_warnings == ("window 0 to 120 s: d",)
     assert len(result.warnings) == 4
+
+
+def test_all_windows_have_the_free_parameters_of_the_first(run, monkeypatch):
+    """Also if its fit fails: the load changes only after its end."""
+    load = np.where(run.time < 125, run.W0, 1.1 * run.W0)
+    trace = trace_of(run.time, run.friction, run.slip, load)
+    asked = []
+
+    def failed(recording, law, free, **_):
+        asked.append((recording.load_varies, free))
+        return SimpleNamespace(converged=False, message="", sentences=())
+
+    monkeypatch.setattr("asperity.inference.fitting.windows.fit", failed)
+    fit_windows(trace, "linker-dieterich", None, [(0.0, 120.0), (0.0, 140.0)])
+    assert asked == [(False, FREE), (True, FREE)]
 
 
 def test_a_single_window_is_refused(run):

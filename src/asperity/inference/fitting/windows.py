@@ -12,12 +12,12 @@ from scipy.special import ndtri
 
 from asperity.errors import InputError, named, require, worded
 from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.intervals import LEVELS, UNDETERMINED, Interval
 from asperity.inference.fitting.result import Fit, Warned
 from asperity.inference.runs.run import RecordedRun, recorded_run
-from asperity.laws import Law
+from asperity.laws import Law, get_law
 from asperity.outputs.json import plain
-from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted, typed
 from asperity.recording import Trace
 from asperity.recording.readers import read
@@ -154,14 +154,15 @@ def fit_windows(
         if windows is None
         else tuple((float(a), float(b)) for a, b in windows)
     )
+    if free is None:
+        chosen = get_law(law) if isinstance(law, str) else law
+        free = free_by_default(chosen, [first], options.get("fixed"), options.get("material"))
     advance = counted(progress, len(spans))
     fits = [fit(first, law, free, **options)]
     advance(1)
     if fits[0].converged:
         start = {k.name: fits[0].values[k.name] for k in fits[0].objective.interest}
         options = {"starts": _STARTS, **options, "start": start}
-        if free is None:
-            free = [name for name in law_parameters(fits[0].objective.law) if name in start]
     for span in spans[1:]:
         fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
         advance(1)
