@@ -166,6 +166,9 @@ def test_what_is_irregular_is_said_and_what_is_not_there_is_asked_for():
         averaged_cycle(measured(3, velocity=None))
     with pytest.raises(InputError, match="must be regular stick-slip"):
         averaged_cycle(measured(3, spread=0.4))
+    twice = [averaged_cycle(measured(3))] * 2
+    with pytest.raises(InputError, match="different names, got recording, recording; give names"):
+        fit(twice, "rice-ruina", ["K"], fixed={**LAW, "M": MACHINE["M"]})
     coarse = averaged_cycle(measured(3, rate=20.0))
     assert not coarse.resolved
     with pytest.raises(InputError, match="M must be fixed where a slip is shorter"):

@@ -181,10 +181,6 @@ def run_terms(
     motion : mapping of str to bool
         ``inertia`` and ``radiation_damping``.
     """
-    if len({run.name for run in runs}) < len(runs):
-        twice = [run.name for run in runs]
-        rule = "have different names"
-        raise InputError("runs", rule, ", ".join(twice), "give names, or each file once")
     terms, unknowns = [], []
     for run in runs:
         suffix = f"[{run.name}]" if len(runs) > 1 or with_table else ""
