@@ -13,6 +13,7 @@ from asperity import materials
 from asperity.errors import InputError, worded
 from asperity.fit_report.folder import material_text, provenance
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
+from asperity.inference.fitting.assembly import Given, objective_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import (
@@ -506,6 +507,34 @@ def test_a_stiffness_shared_with_readings_may_be_given_over_the_load(steps_fit):
     K = result.parameters["K"]
     assert K.unit == "N/m"
     assert K.value == pytest.approx(1000.0 * coverage.STIFFNESS, rel=0.01)
+    assert result.over_load["K/W0"].value == pytest.approx(1e-6 * coverage.STIFFNESS, rel=0.01)
+    of_table = replace(result.objective, fixed=result.objective.fixed | {"W0": 2000.0})
+    assert replace(result, objective=of_table).over_load == {}
+
+
+def test_a_shared_stiffness_over_different_loads_is_refused(steps_fit):
+    """It was that over the load of the first recording, or of the table."""
+    run = replace(steps_fit.objective.terms[0].run, load_unit="N", W0=500.0)
+    other = replace(run, name="other", W0=1000.0, friction=run.friction[::-1].copy())
+    prior, fixed = {"K": Prior(2e3, 20.0, "", "1/m")}, {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0}
+    for data, more in (([run, other], {}), ([readings(), run], {"fixed": fixed})):
+        with pytest.raises(InputError, match="K over the load must come with one W0"):
+            fit(data, "rice-ruina", [*FREE, "K"], prior=prior, **more)
+
+
+def test_numbers_in_columns_of_a_table_are_those_of_the_recordings_too(steps_fit):
+    run = replace(steps_fit.objective.terms[0].run, load_unit="N", W0=1000.0)
+    table, motion = readings(), {"inertia": True, "radiation_damping": False}
+    law, given = get_law("rice-ruina"), Given({"mu0": 0.6, "W0": 1000.0}, None, None, None)
+    for mass in (np.full(12, 0.3), np.linspace(0.3, 0.4, 12)):
+        points = table.points | {"V0": np.full(12, 2e-6), "M": mass}
+        data = [replace(table, points=points), run]
+        if np.ptp(mass):
+            with pytest.raises(InputError, match="M must have one value in a fit with recordings"):
+                objective_of(law, data, FREE, given, motion=motion)
+        else:
+            (term,) = objective_of(law, data, FREE, given, motion=motion).terms_of(RunTerm)
+            assert (term.fixed["V0"], term.fixed["M"]) == (2e-6, 0.3)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import numpy as np
 from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.inputs import (
+    OF_OPTIONS,
     fixed_values,
     require_agreement,
     require_counted,
@@ -253,7 +254,8 @@ def _of_readings(
     require_masses(free, constants, motion)
     begun = start_values(law, free, given.start, material, runs=recordings)
     if table is not None and shared:
-        begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
+        loads = [*np.ravel(constants.get("W0", math.nan)), *(run.W0 for run in recordings)]
+        begun, priors = stiffness_of_table(begun, priors, loads)
     if recordings:
         require_calibrated(
             recordings,
@@ -293,7 +295,7 @@ def _of_readings(
         terms_of_runs, nuisances = run_terms(
             recordings,
             law,
-            {n: v for n, v in constants.items() if np.ndim(v) == 0},
+            _of_recordings(law, constants, motion),
             with_table=table is not None,
             shared_stiffness=shared,
             fixed_stiffness=fixed.get("K"),
@@ -310,3 +312,20 @@ def _of_readings(
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )
+
+
+def _of_recordings(
+    law: type[Law], constants: Mapping[str, Any], motion: Mapping[str, bool]
+) -> dict[str, float]:
+    """Constants with one value each: those of a table may be columns.
+
+    Raises
+    ------
+    InputError
+        If one on which the motion depends has several values.
+    """
+    counted = {*law_parameters(law), *(n for n, option in OF_OPTIONS.items() if motion[option])}
+    for name in counted & constants.keys():
+        rule, advice = "have one value in a fit with recordings", "fit table and recordings apart"
+        require(np.ptp(constants[name]) == 0, symbol(name), rule, "several in the table", advice)
+    return {name: float(np.ravel(value)[0]) for name, value in constants.items()}

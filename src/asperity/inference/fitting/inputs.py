@@ -44,7 +44,7 @@ from asperity.units import KINDS, format_si, to_si
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
 
 #: Parameters that count with an option of the equation of motion.
-_OF_OPTIONS = {"M": "inertia", "eta": "radiation_damping"}
+OF_OPTIONS = {"M": "inertia", "eta": "radiation_damping"}
 #: Velocity (m/s) at which a free mu0 is reported, if no other is given.
 _REFERENCE_VELOCITY = 1e-6
 
@@ -261,7 +261,7 @@ def require_motion(
     ------
     InputError
     """
-    for name, option in _OF_OPTIONS.items():
+    for name, option in OF_OPTIONS.items():
         if name in names and not motion[option]:
             got = f"'{name}', which has no influence without {option.replace('_', ' ')}"
             advice = f"add {Argument(option, value='True')} or leave it out"
@@ -285,7 +285,7 @@ def require_masses(
     ------
     InputError
     """
-    for name, option in _OF_OPTIONS.items():
+    for name, option in OF_OPTIONS.items():
         known = name in free or np.all(np.asarray(constants.get(name, 0.0)) > 0)
         like = Argument("fixed", name, MACHINE[name].example)
         advice = f"add {like}, or name it in {Argument('free')}"

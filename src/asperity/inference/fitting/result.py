@@ -14,6 +14,7 @@ from asperity.arrays import Float
 from asperity.errors import worded
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
+from asperity.inference.runs.assembly import ONE_LOAD
 from asperity.inference.runs.levels import LevelChange, level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
@@ -27,8 +28,6 @@ T = TypeVar("T")
 
 #: Text in place of an estimate that the data do not determine.
 NOT_DETERMINED = "not determined"
-#: Loads of recordings that differ by less than this share count as equal.
-_ONE_LOAD = 1e-3
 #: p-value of chi-squared below which the law or the uncertainties are wrong.
 MISFIT = 0.01
 #: Standard errors from which the sign of A - B is known.
@@ -300,11 +299,13 @@ class Fit(Warned, Drawn):
         for term in self.objective.terms_of(RunTerm):
             name = next((n for n in (f"K[{term.name}]", "K") if n in self.parameters), "")
             loads.setdefault(name, []).append(term.run.W0 if term.run.load_unit else math.nan)
-        if not loads and "K" in self.parameters:
-            loads["K"] = list(np.unique(self.objective.fixed.get("W0", math.nan)))
+        # Those of a table, which recordings may share their K with.
+        loads.setdefault("K" if "K" in self.parameters else "", []).extend(
+            np.unique(self.objective.fixed.get("W0", ()))
+        )
         result = {}
         for name, several in loads.items():
-            if not name or not np.ptp(several) <= _ONE_LOAD * several[0]:
+            if not (name and several) or not np.ptp(several) <= ONE_LOAD * several[0]:
                 continue
             p, load = self.parameters[name], 1e6 * float(np.mean(several))
             result[f"{name}/W0"] = replace(

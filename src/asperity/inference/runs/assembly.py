@@ -32,6 +32,8 @@ _SAMPLES_PER_PARAMETER = 8
 #: Names of parameters of an air layer: its gap, the radius of the patch and the pressure.
 _LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
 Linear = Literal["offset", "trend", "bend", "drift"]
+#: Loads that differ by less than this share are one.
+ONE_LOAD = 1e-3
 #: Prior standard deviations of the departures of initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
 
@@ -245,16 +247,27 @@ def stiffness_of_table(
     InputError
         If the load is no single number, or the prior is of a stress.
     """
-    loads, text, prior = np.unique(W0), start.get("K"), priors.get("K")
-    if over_load(text) is not None or (prior is not None and prior.unit == "1/m"):
-        rule, got = f"come with one fixed {symbol('W0')}", "several or none"
-        one = loads.size == 1 and bool(np.isfinite(loads[0]))
-        require(one, f"{symbol('K')} over the load", rule, got, f"give {symbol('K')} in N/m")
-    load = float(loads[0])
+    _require_one_load(W0, start, priors)
+    load, text = float(np.ravel(W0)[0]), start.get("K")
     of_start = {} if text is None else {"K": _stiffness(text, "N", load, "start.K")}
-    in_newtons = _prior_in(prior, "N/m", load, "a table")
+    in_newtons = _prior_in(priors.get("K"), "N/m", load, "a table")
     of_prior = {} if in_newtons is None else {"K": in_newtons}
     return {**start, **of_start}, {**priors, **of_prior}
+
+
+def _require_one_load(W0: Any, start: Mapping[str, Any], priors: Mapping[str, Prior]) -> None:
+    """Refuse a start or prior of one K over several loads: its value would be that of one load.
+
+    Raises
+    ------
+    InputError
+    """
+    prior, low, high = priors.get("K"), float(np.min(W0)), float(np.max(W0))
+    if over_load(start.get("K")) is not None or (prior is not None and prior.unit == "1/m"):
+        rule, got = f"come with one {symbol('W0')}", "several or none"
+        advice = f"give {symbol('K')} as a stiffness"
+        one = high - low <= ONE_LOAD * low
+        require(one, f"{symbol('K')} over the load", rule, got, advice)
 
 
 def shared_stiffness(
@@ -265,12 +278,13 @@ def shared_stiffness(
     Raises
     ------
     InputError
-        If their loads have different units.
+        If their loads have different units, or a start or prior is over several loads.
     """
     units = list(dict.fromkeys(run.load_unit or "none" for run in runs))
     rule = "be one for all runs if it is named"
     advice = f"leave {symbol('K')} out of the free parameters: each run then has its own"
     require(len(units) <= 1, symbol("K"), rule, f"loads in {' and '.join(units)}", advice)
+    _require_one_load([run.W0 for run in runs], start, priors)
     return free_stiffness(runs[0], "K", start, priors)
 
 
