@@ -165,6 +165,13 @@ def test_alpha_under_a_constant_load_is_refused():
         fit(next(runs_of(CASE, 1)), "linker-dieterich", [*FREE, "alpha"])
 
 
+def test_a_reference_velocity_without_its_friction_is_refused(steps_fit):
+    """The friction at the first velocity was reported as that at V0."""
+    (term,) = steps_fit.objective.terms
+    with pytest.raises(InputError, match=r"fixed\['V0'\] must come with mu0, got it alone"):
+        fit(term.run, "rice-ruina", FREE, fixed={"V0": "1 mm/s"})
+
+
 def test_a_recording_without_steps_is_refused():
     time = np.arange(400) / 10
     noise = 1e-3 * np.random.default_rng(0).normal(size=400)

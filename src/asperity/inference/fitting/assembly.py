@@ -246,9 +246,13 @@ def _of_readings(
         require_newtons(recordings)
     named = [name for name in free if not (name == "K" and recordings and table is None)]
     priors = given.priors(free)
+    mu0_given = "mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
     assumed = {}
     if recordings and table is None:
         first = recordings[0]
+        rule, got = f"come with {symbol('mu0')}", "it alone: the friction at the first velocity"
+        advice = f"free {symbol('mu0')}, which is then that at {symbol('V0')}, or leave it out"
+        require(mu0_given or "V0" not in fixed, Argument("fixed", "V0"), rule, got, advice)
         assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
     constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
     require_masses(free, constants, motion)
@@ -261,8 +265,7 @@ def _of_readings(
             recordings,
             free,
             priors,
-            mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
-            or table is not None,
+            mu0_given=mu0_given or table is not None,
             with_table=table is not None,
         )
         # Its prior makes it free.
