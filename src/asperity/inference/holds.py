@@ -275,7 +275,8 @@ class HoldTerm(DataTerm):
             Information matrix of table and priors: a parameter that its prior determines leaves
             the residuals as a fixed one does.
         """
-        self._freedom = self.table.rows - float(leverages(residuals, information).sum())
+        fitted = leverages(residuals.jacobian, information).sum()
+        self._freedom = self.table.rows - float(fitted)
         factor = math.sqrt(float(np.sum(residuals.values**2)) / self._freedom)
         self.error *= max(factor, 1e-12)
         return factor

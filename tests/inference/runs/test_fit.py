@@ -16,6 +16,7 @@ from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.assembly import Given, objective_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.intervals import parabola_of
 from asperity.inference.fitting.plausibility import (
     contradicted_stiffness,
     unusual_numbers,
@@ -486,6 +487,14 @@ def test_readings_and_a_recording_are_fitted_together_each_with_its_stiffness(st
         p = result.parameters[name]
         assert abs(p.value - TRUE[name]) < 4 * p.se
         assert p.se < steps_fit.parameters[name].se
+    # A misfit of the readings is not hidden by the samples of the recording.
+    table, run = result.objective.terms
+    off = table.table.values["mean_friction"] + np.tile([2e-3, -2e-3], 6)
+    other = table.with_table(replace(table.table, values={"mean_friction": off}))
+    objective = replace(result.objective, terms=(other, run))
+    at = parabola_of(objective, *objective.minimise(objective.coordinates(result.values)))
+    assert 9 <= at.dof <= 12
+    assert at.p_value < 1e-4
 
 
 @pytest.mark.parametrize(("free", "fixed"), [([*FREE, "K"], {}), (FREE, {"K": 2e6})])

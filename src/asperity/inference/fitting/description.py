@@ -279,7 +279,7 @@ def _fit_with(
         undetermined=tuple(
             name for name, e in estimates.items() if name in at.undetermined or not _bounded(e)
         ),
-        chi2=at.chi2,
+        chi2=at.judging,
         dof=at.dof,
         p_value=at.p_value,
         log_likelihood=-deviance / 2,
@@ -287,7 +287,9 @@ def _fit_with(
         bic=deviance + k * math.log(n),
         observables=_observables(at.data),
         residuals=at.data,
-        optima=tuple(Optimum(value, objective.named(v)) for v, value in rivals),
+        optima=tuple(
+            Optimum(at.judging + value - at.chi2, objective.named(v)) for v, value in rivals
+        ),
         objective=objective,
     )
 

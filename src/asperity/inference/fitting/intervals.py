@@ -18,6 +18,7 @@ from scipy.special import chdtrc, ndtr, ndtri
 
 from asperity.arrays import Bool, Float
 from asperity.inference.objective import Objective, Residuals
+from asperity.inference.tables.residuals import leverages
 from asperity.parameters.arguments import typed
 
 Interval = tuple[float, float]
@@ -149,6 +150,11 @@ class Parabola:
         Whether chi-squared still falls towards values at which the law has no orbit.
     fitted, priors : int
         Number of fitted parameters, including those of the noise, and number of priors.
+    judging : float
+        Chi-squared of the data with given uncertainties and of priors; of all data if all noise is
+        estimated.
+    dof : int
+        Degrees of freedom of `judging`.
     """
 
     u: Float
@@ -163,6 +169,8 @@ class Parabola:
     stopped: bool
     fitted: int
     priors: int
+    judging: float
+    dof: int
 
     @property
     def sd(self) -> Float:
@@ -180,14 +188,9 @@ class Parabola:
         return sum(d.values.size for d in self.data)
 
     @property
-    def dof(self) -> int:
-        """Degrees of freedom."""
-        return self.readings + self.priors - self.fitted
-
-    @property
     def p_value(self) -> float:
         """Probability of as large a chi-squared by chance; NaN without degrees of freedom."""
-        return float(chdtrc(self.dof, self.chi2)) if self.dof > 0 else math.nan
+        return float(chdtrc(self.dof, self.judging)) if self.dof > 0 else math.nan
 
 
 def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
@@ -212,6 +215,15 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         if not unknown.nuisance
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > UNDETERMINED)
     )
+    fitted = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
+    judging, dof = chi2, r.size - fitted
+    given = [term.profiled == 0 for term in objective.terms]
+    if any(given) and not all(given):
+        # Innovations have unit variance by their estimated noise, and would hide a misfit.
+        of_data = np.repeat(given, [d.values.size for d in data])
+        judges = np.concatenate([of_data, ~np.array(nuisance, bool)])
+        judging = float(np.sum(r[judges] ** 2))
+        dof = round(float(np.sum(1 - leverages(J[judges], J.T @ J))))
     return Parabola(
         u=u,
         chi2=chi2,
@@ -223,8 +235,10 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         unbounded=u - covariance @ _gradient_at_bounds(objective, u, covariance, J.T @ r),
         undetermined=undetermined,
         stopped=objective.noise_is_known and objective.expected_decrease(u) > _STOPPED,
-        fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
+        fitted=fitted,
         priors=len(with_prior),
+        judging=judging,
+        dof=dof,
     )
 
 

@@ -180,7 +180,8 @@ class Fit(Warned, Drawn):
     undetermined : tuple of str
         Parameters that these data do not determine: their standard error exceeds a factor of e.
     chi2 : float
-        Chi-squared of data and priors.
+        Chi-squared of the data with given uncertainties and of priors; of all data if all noise is
+        estimated.
     dof : int
     p_value : float
         Probability of a larger chi-squared if law and uncertainties are right.

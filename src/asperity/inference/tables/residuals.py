@@ -340,20 +340,20 @@ def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
     return float(chdtrc(away.size, away @ np.linalg.solve(spread, away)))
 
 
-def leverages(residuals: Residuals, information: Float) -> Float:
+def leverages(jacobian: Float, information: Float) -> Float:
     """Share of each residual's variance that the fit removes, shape (n,): 1 if it fits it exactly.
 
     Parameters
     ----------
-    residuals : Residuals
+    jacobian : array, shape (n, coordinates)
+        Of some of the residuals.
     information : array, shape (coordinates, coordinates)
         Information matrix of all data and priors of the fit; other data reduce the leverage.
     """
-    J = residuals.jacobian
     size = np.sqrt(np.diag(information))
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
-    return np.asarray(np.einsum("ij,jk,ik->i", J / size, inverse, J / size))
+    return np.asarray(np.einsum("ij,jk,ik->i", jacobian / size, inverse, jacobian / size))
 
 
 def standardised(residuals: Residuals, information: Float) -> Float:
@@ -364,8 +364,9 @@ def standardised(residuals: Residuals, information: Float) -> Float:
 
     Parameters
     ----------
-    residuals, information
+    residuals : Residuals
+    information : array
         As of `leverages`.
     """
-    leverage = leverages(residuals, information)
+    leverage = leverages(residuals.jacobian, information)
     return np.asarray(residuals.values / np.sqrt(np.maximum(1 - leverage, 1e-6)))

@@ -334,7 +334,7 @@ class LockInTerm(DataTerm):
 
     def _small_errors(self, residuals: Residuals, information: Float) -> list[str]:
         """Sentences on readings that decide the fit by uncertainties far below the others."""
-        table, decisive = self.table, leverages(residuals, information) > _DECISIVE
+        table, decisive = self.table, leverages(residuals.jacobian, information) > _DECISIVE
         sentences = []
         for name, values in table.values.items():
             size = table.values[f"mu{name[-1]}"] if name.startswith("phase") else np.abs(values)
