@@ -276,6 +276,8 @@ def added_without(
         Samples are unknown from this leverage on: the share that a sample has in its own fitted
         value.
     """
+    if not rows:  # no velocity changes
+        return np.zeros_like(covariance), []
     impulses = innovations(np.eye(white.shape[0])[:, rows], noise, stretches, basis)
     impulses /= np.sqrt(np.einsum("ij,ij->j", impulses, impulses))
     along = impulses.T @ white
