@@ -244,6 +244,11 @@ def test_errors_of_epsilon_count_as_effective_variance(pmma):
     for result, added in zip(results, (0.0, of_epsilon), strict=True):
         expected = error * np.sum(of_A**2 / (1 + added)) ** -0.5
         assert result.parameters["A"].se == pytest.approx(expected, rel=1e-3)
+        # They count with other fixed numbers too.
+        (term,) = result.objective.terms
+        softer = term.with_fixed({**result.objective.fixed, "K": 4e5})
+        np.testing.assert_array_equal(softer.weights.matrix, term.weights.matrix)
+        assert set(softer.fixed["K"]) == {4e5}
     deviance = np.sum(np.log1p(of_epsilon))
     densities = [f.objective.log_likelihood(f.objective.coordinates(f.values)) for f in results]
     assert 2 * (densities[0] - densities[1]) == pytest.approx(deviance, rel=1e-3)

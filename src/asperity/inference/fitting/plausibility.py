@@ -141,9 +141,11 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     (term,), (K,) = tables, given.tolist()
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
     (stiffness,) = unknowns_of(objective.law, ["K"], start={"K": K}, priors={})
+    part = term.with_fixed(fixed)
+    part.use_search(False)
     free = replace(
         objective,
-        terms=(LockInTerm(term.table, objective.law, fixed, **term.motion),),
+        terms=(part,),
         unknowns=(*objective.unknowns, stiffness),
         fixed=fixed,
     )
@@ -200,8 +202,7 @@ def shift_of_estimates(
     (term,) = tables
     sides = []
     for change in (high, low):
-        fixed = {**fit.objective.fixed, **change}
-        changed = LockInTerm(term.table, fit.objective.law, fixed, **term.motion)
+        changed = term.with_fixed({**fit.objective.fixed, **change})
         changed.use_search(True)
         residuals = changed.residuals(fit.values)
         if residuals is None:

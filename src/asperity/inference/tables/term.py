@@ -83,6 +83,11 @@ def _require_motion_of_rows(table: LockInTable, motion: Mapping[str, bool]) -> N
         require(motion[option] or not counted.any(), option, rule, got, advice)
 
 
+def _in_rows(fixed: Mapping[str, Any], rows: int) -> dict[str, Float]:
+    """Numbers with a value in each row."""
+    return {n: np.broadcast_to(np.asarray(v, float), (rows,)) for n, v in fixed.items()}
+
+
 class LockInTerm(DataTerm):
     """A table of lock-in readings as a `DataTerm` of an objective.
 
@@ -126,9 +131,7 @@ class LockInTerm(DataTerm):
         self.name, self.observables = table.name, table.observables
         self.motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
         _require_motion_of_rows(table, self.motion)
-        self.fixed = {
-            n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
-        }
+        self.fixed = _in_rows(fixed, table.rows)
         # Programs are compiled for the whole table, and used for any of its rows.
         function = partial(response_function, law, **self.motion, least_points=table.rows)
         self._functions: dict[bool | str, ResponseFunction] = {
@@ -212,6 +215,12 @@ class LockInTerm(DataTerm):
         """The term with other readings at the same operating points."""
         result = copy(self)
         result.table, result._weights = table, None
+        return result
+
+    def with_fixed(self, fixed: Mapping[str, Any]) -> LockInTerm:
+        """The term with other numbers that are not free, and without its orbits."""
+        result = copy(self)
+        result.fixed, result._visited = _in_rows(fixed, self.table.rows), []
         return result
 
     def weighted(self, weights: Float) -> LockInTerm:
