@@ -42,8 +42,6 @@ _USUAL = {
     "D2": (1e-7, 1e-4),
     "eps_ratio": (0.2, 1.0),
 }
-#: Smallest scale of a linear coordinate, as a share of a usual value.
-_LEAST_SCALE = 1e-3
 #: A positive parameter is searched within this factor of its range of starts.
 _FARTHEST = 1e6
 #: Factor by which a logarithmic range exceeds the usual values; factor of the highest usual value
@@ -282,9 +280,9 @@ def unknown_of(
         low, high = max(low, prior.mean - 3 * prior.sd), min(high, prior.mean + 3 * prior.sd)
         low = max(low, prior.mean / 10) if prior.mean > 0 else low
     high = min(high, upper)
-    # A start may be nearly zero, which is no scale.
+    # A start may be nearly zero, or too small, which is no scale.
     typical = math.sqrt(usual[0] * usual[1]) if usual and usual[0] > 0 else 0.0
-    scale = 1.0 if positive else max(abs(middle or typical), _LEAST_SCALE * typical)
+    scale = 1.0 if positive else max(abs(middle or 0.0), typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
 

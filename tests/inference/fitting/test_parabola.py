@@ -11,7 +11,13 @@ from scipy.stats import norm
 from asperity.inference import RunOptions, fit
 from asperity.inference.fitting.assembly import Given, listed_data, objective_of
 from asperity.inference.fitting.description import described_fit
-from asperity.inference.fitting.intervals import bounded_interval, nowhere_negative, parabola_of
+from asperity.inference.fitting.intervals import (
+    bounded_interval,
+    determined,
+    nowhere_negative,
+    parabola_of,
+)
+from asperity.inference.unknowns import unknowns_of
 from asperity.laws import get_law
 from references.populations import population
 
@@ -36,6 +42,24 @@ def test_a_positive_covariance_added_by_noise_is_unchanged():
     root = np.random.default_rng(0).normal(size=(4, 4)) * [1e-3, 1.0, 1e4, 1.0]
     added = root.T @ root
     np.testing.assert_allclose(nowhere_negative(added, 20 * added), added, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("law", "name", "start"),
+    [
+        ("elasto-plastic", "lambda", 1e-9),
+        ("elasto-plastic", "lambda", None),
+        ("linker-dieterich", "alpha", 0.01),
+    ],
+)
+def test_whether_data_determine_a_parameter_does_not_depend_on_its_start(law, name, start):
+    """With a start far below it, an estimate good to 7 % was said to be not determined."""
+    given = {} if start is None else {name: start}
+    (one,) = unknowns_of(get_law(law), [name], start=given, priors={})
+    usual = np.sqrt(one.start[0] * one.start[1]) if start is None else 1000 * start
+    u = float(one.to_coordinate(usual))
+    assert determined(one, u, float(one.to_coordinate(usual / 15)))
+    assert not determined(one, u, float(one.to_coordinate(1.5 * usual)))
 
 
 def test_a_bound_of_a_delay_shifts_no_other_estimate():
