@@ -247,6 +247,7 @@ def test_rows_keep_their_names(exact):
         ({"fixed": {"M": "1 kg"}}, "M'] must have an influence"),
         ({"fixed": {"V": "5 um/s"}}, "V'] must agree with the column of the data"),
         ({"fixed": {"K": "5e-3 1/um"}}, "K'] must agree with the column of the data"),
+        ({"fixed": {"K": 5e3, "W0": 1.0}}, "K'] must agree with the column of the data"),
     ],
 )
 def test_what_has_no_influence_on_holds_is_refused(exact, options, words):

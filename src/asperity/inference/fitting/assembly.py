@@ -154,8 +154,12 @@ def _of_holds(law: type[Law], table: HealingTable, free: list[str], given: Given
     known = point_parameters(law)
     if "V" in given.fixed:
         require_agreement(known["V"], given.fixed["V"], table.V)
-    if (K := over_load(given.fixed.get("K"))) is not None:
-        require_agreement(replace(known["K"], kind="per_length"), K, table.K)
+    K, W0 = (given.fixed.get(name) for name in ("K", "W0"))
+    over = over_load(K)
+    if over is None and not (K is None or W0 is None):
+        over = known["K"].check(K) / known["W0"].check(W0)
+    if over is not None:
+        require_agreement(replace(known["K"], kind="per_length"), over, table.K)
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
     constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
     begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
