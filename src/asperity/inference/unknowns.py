@@ -146,6 +146,13 @@ class Unknown:
             return math.log(low), math.log(high)
         return self.lower / self.scale, self.upper / self.scale
 
+    def widest(self, u: float) -> float:
+        """Largest standard deviation of a coordinate that data determine, at an estimate u.
+
+        A factor of e for a logarithm; for others the usual value, and the estimate itself.
+        """
+        return 1.0 if self.logarithmic else max(1.0, abs(u))
+
     def range_about(self, u: float, sd: float) -> tuple[float, float]:
         """Range of the coordinate for posteriors and evidence, about an estimate with its error.
 
@@ -165,7 +172,7 @@ class Unknown:
         else:
             top = _LINEAR * abs(self.start[1]) / self.scale
             usual = (max(low, -top), top)
-        reach = _REACH * min(sd, 1.0)
+        reach = _REACH * min(sd, self.widest(u))
         return max(low, min(usual[0], u - reach)), min(high, max(usual[1], u + reach))
 
     def end(self, u: float) -> float:

@@ -360,7 +360,8 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
     sd = at.sd
     result = []
     for i, unknown in enumerate(objective.unknowns):
-        if unknown.nuisance or at.missing[i] or not _PRECISE < sd[i] <= UNDETERMINED:
+        widest = unknown.widest(float(at.u[i]))
+        if unknown.nuisance or at.missing[i] or not _PRECISE < sd[i] <= widest:
             continue
         for sign in (-1, 1):
             point = at.u + sign * _COMPARED_AT * at.covariance[:, i] / sd[i]

@@ -19,7 +19,6 @@ from scipy.special import chdtrc, ndtr, ndtri
 from asperity.arrays import Bool, Float
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.tables.residuals import leverages
-from asperity.inference.unknowns import Unknown
 from asperity.parameters.arguments import typed
 
 Interval = tuple[float, float]
@@ -112,8 +111,7 @@ def _interval_above(estimate: float, sd: float, level: float, bound: float) -> I
     return bound + sd * low, bound + sd * high
 
 
-#: A coordinate with a larger standard deviation is not determined: a factor of e of a logarithmic
-#: one; for others the usual value, and the estimate itself.
+#: A logarithmic coordinate with a larger standard deviation (a factor of e) is not determined.
 UNDETERMINED = 1.0
 #: A delay that is closer to its bound than this share of its range is at the bound.
 _AT_BOUND = 1e-3
@@ -215,7 +213,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         unknown.name
         for i, unknown in enumerate(objective.unknowns)
         if not unknown.nuisance
-        and (missing[i] or not determined(unknown, u[i], math.sqrt(max(informed[i, i], 0.0))))
+        and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > unknown.widest(u[i]))
     )
     fitted = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
     judging, dof = chi2, r.size - fitted
@@ -242,11 +240,6 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         judging=judging,
         dof=dof,
     )
-
-
-def determined(unknown: Unknown, u: float, sd: float) -> bool:
-    """Whether data determine a coordinate with an estimate and its standard deviation."""
-    return sd <= UNDETERMINED * (1.0 if unknown.logarithmic else max(1.0, abs(u)))
 
 
 def _known_at_bound(objective: Objective, u: Float) -> Bool:
@@ -375,8 +368,9 @@ class Profile:
         self.whole, self.i, self.u, self.chi2 = objective, i, u, chi2
         self.search, self.most = search, most
         self._coarsen()
-        # A step is at most a factor of e: the approximation may fail further away.
-        self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
+        # The approximation may fail further away.
+        widest = objective.unknowns[i].widest(float(u[i]))
+        self.sd = min(float(np.sqrt(covariance[i, i])), widest)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
         self._unsolved: set[float] = set()

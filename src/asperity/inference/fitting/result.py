@@ -338,12 +338,17 @@ class Fit(Warned, Drawn):
 
     @property
     def coordinate_errors(self) -> Float:
-        """Standard errors of the coordinates of the fit, shape (n,), at most 1.
+        """Standard errors of the coordinates of the fit, shape (n,), at most `Unknown.widest`.
 
-        The normal approximation fails farther away: 1 is a factor of e of a positive parameter.
+        The normal approximation fails farther away.
         """
         pairs = zip(self.parameters.values(), self.objective.unknowns, strict=True)
-        return np.minimum([abs(p.se / k.slope(p.value)) for p, k in pairs], 1.0)
+        return np.array(
+            [
+                min(abs(p.se / k.slope(p.value)), k.widest(float(k.to_coordinate(p.value))))
+                for p, k in pairs
+            ]
+        )
 
     @property
     def values(self) -> dict[str, float]:

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from asperity.errors import InputError, named, require, worded
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.inputs import free_by_default
-from asperity.inference.fitting.intervals import LEVELS, Interval, determined
+from asperity.inference.fitting.intervals import LEVELS, Interval
 from asperity.inference.fitting.result import Fit, Warned
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law, get_law
@@ -245,4 +245,4 @@ def _window_estimate(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate,
         interval(LEVELS[1]),
         tuple(f.parameters[unknown.name].value if f.converged else np.nan for f in fits),
     )
-    return estimate, determined(unknown, mean, total)
+    return estimate, total <= unknown.widest(mean)
