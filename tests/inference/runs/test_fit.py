@@ -660,6 +660,14 @@ def test_a_gain_with_a_prior_widens_the_intervals(steps_fit):
         assert abs(p.value - TRUE[name]) < 4 * p.se
     assert wide.values["D0"] == pytest.approx(steps_fit.values["D0"], rel=3e-3)
     assert wide.parameters["D0"].se == pytest.approx(steps_fit.parameters["D0"].se, rel=2e-2)
+    # With A, B and K known the recording contradicts another gain.
+    priors = {n: Prior(wide.values[n], 1e-3 * wide.values[n], "") for n in ("A", "B", "K")}
+    priors["gain"] = Prior(1.5, 0.01, "")
+    known = (replace(u, prior=priors.get(u.name, u.prior)) for u in wide.objective.unknowns)
+    objective = replace(wide.objective, unknowns=tuple(known))
+    end = objective.minimise(objective.coordinates(wide.values))
+    said = described_fit(objective, [end], profile=False).warnings
+    assert any(w.startswith("the prior of gain, 1.5 +- 0.01, is contradicted") for w in said)
 
 
 @pytest.mark.parametrize(

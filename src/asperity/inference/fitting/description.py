@@ -330,7 +330,8 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     warnings = []
     for (unknown, prior), r, j in zip(with_prior, values, slopes, strict=True):
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
-        if not unknown.nuisance and apart > _CONTRADICTED:
+        # A gain is a nuisance whose prior is the user's.
+        if (unknown.logarithmic or not unknown.nuisance) and apart > _CONTRADICTED:
             warnings.append(
                 f"the prior of {named(unknown.name)}, {prior.mean:.4g} +- {prior.sd:.2g} "
                 f"{unknown.parameter.unit}".rstrip()
