@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from asperity import materials
 from asperity.errors import InputError
-from asperity.inference import table_of
+from asperity.inference import Prior, table_of
 from asperity.study import (
     SweepPlan,
     export_store,
@@ -21,7 +21,7 @@ from asperity.study import (
     run_sweep,
     store_status,
 )
-from asperity.study.solve.fit import _fixed
+from asperity.study.solve.fit import FitSolve, _fixed
 from references.closed_form_sweep import ThisProcess
 
 PMMA = materials.load("bureau2000")
@@ -144,6 +144,15 @@ def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_t
     assert np.corrcoef(turned.real, turned.imag)[0, 1] == pytest.approx(0.6, abs=0.05)
     assert drawn.values["mu1"] * drawn.errors["phase1"] == pytest.approx(amplitude * across)
     assert drawn.correlations() == pytest.approx(table.correlations())
+
+
+def test_a_prior_of_K_over_the_load_keeps_its_unit(tmp_path: Path) -> None:
+    """It was taken in N/m, as of a load of 1 N."""
+    write(tmp_path / "a.csv", 0)
+    fit = {"free": ("K",), "prior": {"K": "0.03+-0.001 1/um"}, "data": "a.csv"}
+    axes = {"A": {"values": (0.01, 0.012)}}
+    prior = FitSolve().settings(plan(tmp_path, fit=fit, axes=axes))["prior"]["K"]
+    assert Prior(*prior) == Prior(3e4, 1e3, "given", "1/m")
 
 
 @pytest.mark.parametrize(

@@ -176,7 +176,7 @@ def _free(table: FitTable) -> list[str]:
 
 
 def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
-    """Mean, standard deviation (SI) and source of each prior."""
+    """Mean, standard deviation (SI), source and SI unit of each prior."""
     from asperity.inference.fitting.inputs import priors_of
 
     known = _known()
@@ -191,7 +191,7 @@ def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list
         else:
             written[canonical] = prior
     priors = priors_of(written, free)
-    return {name: [p.mean, p.sd, p.source] for name, p in priors.items()}
+    return {name: [p.mean, p.sd, p.source, p.unit] for name, p in priors.items()}
 
 
 def _digest(path: Path) -> str:
