@@ -217,8 +217,11 @@ def test_roles_and_times_of_the_user_go_before_expressions_of_a_recipe(tmp_path)
 @pytest.mark.parametrize(
     ("options", "rule"),
     [
-        ({"columns": {"F": "Gauge", "force": "Shear"}}, "F.* must be one column, got 'F' and 'fo"),
+        ({"columns": {"F": "Gauge", "force": "Shear"}}, "F.* must be one column.* 'F' and 'force'"),
         ({"columns": {"time": "Tick"}, "rate": "1 Hz"}, "left out next to a sampling rate"),
+        ({"columns": {"F": "Shear"}, "channels": {"force": "Gauge"}}, "'F' and 'force'"),
+        ({"channels": {"load": "Gauge", "W": "Shear"}}, "be one .*, got 'load' and 'W'"),
+        ({"columns": {"F": 1}, "units": {"F": "N", "Gauge": "kN"}}, "once, got 'N' and 'kN'"),
     ],
 )
 def test_two_columns_for_one_role_are_refused(tmp_path, options, rule):
@@ -226,6 +229,16 @@ def test_two_columns_for_one_role_are_refused(tmp_path, options, rule):
     path.write_text("Tick (s),Gauge (N),Shear (N)\n0,1,5\n2,2,6\n4,3,7\n")
     with pytest.raises(InputError, match=rule):
         read(path, **options)
+    with pytest.raises(InputError, match=rule):
+        read(path, recipe=ReadingRecipe(**options))
+
+
+def test_a_unit_of_the_user_goes_before_that_of_a_recipe(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time (s),Gauge,Shear (N)\n0,1,5\n2,2,6\n4,3,7\n")
+    recipe = ReadingRecipe(units={"Gauge": "kN"})
+    trace = read(path, {"F": "Gauge"}, {"F": "N"}, recipe=recipe)
+    assert trace.channel("F").values.tolist() == [1, 2, 3]
 
 
 def test_a_missing_recipe_is_refused(tmp_path):

@@ -123,6 +123,19 @@ def test_a_unit_of_the_user_overrides_that_of_the_file_and_is_named(recording):
     assert trace.channel("W").values[0] == 1000
 
 
+def test_a_row_of_units_that_contradicts_the_headings_is_refused(recording):
+    path = recording("t (s),load (kN),shear (N),x", "sec,N,N,um", *ROWS)
+    with pytest.raises(InputError, match=r"units\['load'\] must be one unit, got 'kN' in the head"):
+        read(path)
+    assert read(path, units={"load": "kN"}).channel("W").values[0] == 1000
+
+
+def test_an_index_n_above_another_unit_is_no_newton(recording):
+    trace = read(recording("time_s,F_N,mu,x_um", "s,kN,-,um", *ROWS))
+    assert list(trace.channels) == ["F_N", "mu", "x"]
+    assert trace.channel("W").values[0] == 1000
+
+
 def test_ambiguous_columns_are_refused_until_the_user_chooses(recording):
     path = recording("time_s,Shear left (N),Shear right (N),W_N", *ROWS)
     with pytest.raises(InputError, match=r"'Shear left' or 'Shear right'; choose when reading"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,7 +36,7 @@ from asperity.recording.roles import (
 from asperity.recording.trace import Channel, Trace, checked
 
 if TYPE_CHECKING:
-    from asperity.recording.readers.raw import RawRecording
+    from asperity.recording.readers.raw import RawColumn, RawRecording
 
 
 #: Largest length of a column's name.
@@ -49,26 +49,29 @@ def assemble(
     recorded: RawRecording,
     path: Path,
     columns: Mapping[str, str | int] | None,
-    units: Mapping[str, str] | None,
+    units: Sequence[Mapping[str, str]],
     rate: float | str | None,
 ) -> Trace:
-    """The trace of a file's columns; the arguments are those of `read`."""
+    """The trace of a file's columns; the arguments are those of `read`.
+
+    Of two units of a column in different mappings, that of the last counts.
+    """
     findings = list(recorded.findings)
-    split = split_labels([c.label for c in recorded.columns])
+    split = _names_and_units(recorded.columns)
     # Names of a damaged file may hold anything.
     names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
     recorded_columns = dict(zip(names, recorded.columns, strict=True))
-    texts = {}
-    for (name, column), (_, unit_in_heading) in zip(recorded_columns.items(), split, strict=True):
-        # The unit that the format states for the column goes before that in the heading.
-        stated_unit = column.unit or ""
-        texts[name] = unit_in_heading if is_empty(stated_unit) else without_brackets(stated_unit)
+    written = dict(zip(names, (units for _, units in split), strict=True))
+    texts = {name: units[-1] for name, units in written.items()}
     headings = {name: column.label for name, column in recorded_columns.items()}
     try:
         roles = _chosen_roles(columns or {}, headings)
-        stated = _by_name(units or {}, headings, roles)
+        stated: dict[str, str] = {}
+        for mapping in units:
+            stated |= _by_name(mapping, headings, roles)
     except InputError as error:
         raise with_cause(error, findings) from None
+    _refuse_two_units({n: u for n, u in written.items() if n not in stated})
     known = _known_units(texts, stated, findings)
     _check_kinds(roles, known)
     values = {name: column.values for name, column in recorded_columns.items()}
@@ -104,6 +107,30 @@ def assemble(
     provenance = {"file": known_as(path).name, **recorded.provenance, "time": clock.source}
     roles = {role: name for role, name in roles.items() if role != "time"}
     return checked(Trace(clock.time, channels, tuple(findings), provenance, roles))
+
+
+def _names_and_units(columns: Sequence[RawColumn]) -> list[tuple[str, list[str]]]:
+    """Name of each column, and the units in its heading and next to it; at least one, maybe empty.
+
+    What follows an underscore is part of the name where the file states another unit, as F_N in kN.
+    """
+    split = []
+    for column, (name, unit) in zip(columns, split_labels([c.label for c in columns]), strict=True):
+        stated = "" if is_empty(column.unit or "") else without_brackets(column.unit or "")
+        suffixed = column.label.strip().removeprefix(f"{name}_").replace("_", "/") == unit
+        if stated and suffixed and understood(stated) != understood(unit):
+            name, unit = column.label.strip(), ""
+        split.append((name, [text for text in (unit, stated) if text] or [""]))
+    return split
+
+
+def _refuse_two_units(written: Mapping[str, list[str]]) -> None:
+    """Refuse a column whose heading has another unit than the file states next to it."""
+    for name, units in written.items():
+        known = [understood(text) for text in units]
+        rule, got = "be one unit", f"'{units[0]}' in the heading and '{units[-1]}' next to it"
+        alike = None in known or known[0] == known[-1]
+        require(alike, Argument("units", name), rule, got, "say which one is right")
 
 
 def _unique(names: list[str], findings: list[Finding]) -> list[str]:
@@ -172,6 +199,9 @@ def _by_name(
             name = key if key in headings else find_channel(key, kinds, roles, headings)
         except InputError as error:
             raise error.about(Argument("units")) from None
+        got = f"'{by_name.get(name)}' and '{text}'"
+        once = by_name.get(name, text) == text
+        require(once, Argument("units", name), "be given once", got, "leave one out")
         by_name[name] = text
     return by_name
 

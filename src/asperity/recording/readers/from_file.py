@@ -232,7 +232,8 @@ def read(
         recipe = ReadingRecipe.from_file(recipe)
     rules = ReadingRecipe() if recipe is None else recipe
     layout = {"group": group, "delimiter": delimiter, "decimal": decimal}
-    _require_one_each(columns or {}, rate)
+    _require_one_each(rules.columns, rules.channels, rules.rate)
+    _require_one_each(columns or {}, channels or {}, rate)
     # A role that the user gives goes before an expression of the recipe for it, and so do times.
     chosen = {role_of(name) for name in columns or {}} | ({"time"} if rate is not None else set())
     kept = {n: text for n, text in rules.channels.items() if (role_of(n) or n) not in chosen}
@@ -253,7 +254,7 @@ def read(
             recorded,
             file,
             {**rules.columns, **(columns or {})},
-            {**rules.units, **(units or {})},
+            (rules.units, units or {}),
             "1 Hz" if no_clock else rate,
         )
         if no_clock:
@@ -266,17 +267,20 @@ def read(
     return replace(trace, findings=(*trace.findings, *_library_warnings(warned)))
 
 
-def _require_one_each(columns: Mapping[str, Any], rate: float | str | None) -> None:
-    """Refuse two columns for one role, as F and force, and two ways to times."""
+def _require_one_each(
+    columns: Mapping[str, Any], channels: Mapping[str, str], rate: float | str | None
+) -> None:
+    """Refuse two columns or expressions for one role, as F and force, and two ways to times."""
     names: dict[str, str] = {}
-    for name in columns:
+    for name in (*columns, *channels):
         role = role_of(name) or name
-        got = f"'{names.get(role)}' and '{name}'"
-        require(role not in names, Argument("columns", role), "be one column", got, "leave one out")
+        rule, got = "be one column or channel", f"'{names.get(role)}' and '{name}'"
+        advice = "leave one out; an expression can have the column by its own name"
+        require(role not in names, Argument("columns", role), rule, got, advice)
         names[role] = name
-    rule, got = "be left out next to a sampling rate", shown(columns.get(names.get("time", "")))
-    once = rate is None or "time" not in names
-    require(once, Argument("columns", "time"), rule, got, "give one of them")
+    clock = next((name for name in columns if role_of(name) == "time"), "")
+    rule, got = "be left out next to a sampling rate", shown(columns.get(clock))
+    require(rate is None or not clock, Argument("columns", "time"), rule, got, "give one of them")
 
 
 def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
