@@ -89,6 +89,9 @@ def test_the_regime_of_a_recording_is_recognised(case) -> None:
     # Drops are read by fits of the shapes of slips, which do not suit a sine.
     (regime,) = (check for check in result.checks if check.name == "regime")
     assert (regime.verdict == "ok") == (not kind.startswith(("oscillation", "cannot tell")))
+    # V and means of a drive of two velocities belong to none of them.
+    loading = {c.verdict for c in result.checks if c.name == "loading"} - {"ok"}
+    assert loading == ({"suspicious"} if case == "another velocity" else set())
 
 
 @pytest.mark.parametrize("seed", population(10))

@@ -18,7 +18,7 @@ from asperity.measurement.sliding.signals import (
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
-from asperity.measurement.stick_slip.regimes import Regime, regimes
+from asperity.measurement.stick_slip.regimes import Regime, loading_changes, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import STICK_SLIP, Check, Judged, percent
 from asperity.parameters.parameter import SummaryLine
@@ -460,6 +460,12 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     ask("regime", len(open_) + len(swings), kind, doubt if swings and not open_ else "")
     if not count:
         return checks
+    changes = int(np.count_nonzero(loading_changes(events.loading_slope)))
+    text = f"the loading slope changes {changes} times"
+    doubt = (
+        ", as velocity or stiffness does; V, slope and means are those of all cycles: give a window"
+    )
+    ask("loading", changes, text, doubt)
     drop = float(np.median(events.drop))
     step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
     near = float(np.mean(events.drop < _NEAR * least))

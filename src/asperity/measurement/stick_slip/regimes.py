@@ -120,7 +120,7 @@ def regimes(
     rise = events.force_before[1:] - events.force_after[:-1]
     loads = rise > _LOADED * np.minimum(slope[:-1], slope[1:]) * quiet
     slides = (quiet > _LONG * np.maximum(cycle[:-1], cycle[1:])) & ~loads
-    lasts = np.flatnonzero(slides | _other_velocity(events.loading_slope))
+    lasts = np.flatnonzero(slides | loading_changes(events.loading_slope))
     parts: list[Regime] = []
     edge, first = float(time[0]), 0
     for stop in [*(lasts + 1), len(events)]:
@@ -156,7 +156,7 @@ def _usual(values: Float) -> Float:
     return np.asarray(median_filter(known, 2 * _NEAR - 1, mode="reflect"))
 
 
-def _other_velocity(slope: Float) -> Bool:
+def loading_changes(slope: Float) -> Bool:
     """Events after which the loading slope changes, because velocity or stiffness has changed.
 
     An entry for each stick; entry k is true where the events up to k load otherwise than those

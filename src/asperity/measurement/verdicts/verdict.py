@@ -127,6 +127,7 @@ STICK_SLIP = Limits(
     {
         "events": (10.0, 3.0),
         "regime": (0.0, inf),
+        "loading": (0.0, inf),
         "sampling": (0.05, 0.5),
         "threshold": (0.1, inf),
         "hidden events": (0.02, inf),
