@@ -173,6 +173,7 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.loads.sampled("fast"), "load must be a finite number, got 'fast'"),
         (lambda: asp.run(3, "run.csv"), "protocol must be a Protocol"),
         (lambda: asp.experiment.hold_response(SLIDER, hold_time=[], velocity=1e-6), "have a point"),
+        (lambda: asp.periodic_response(SLIDER, **{**POINT, "epsilon": []}), "have a point, got an"),
         (lambda: asp.write([], "a.csv"), "data must hold a measurement, got none"),
         (lambda: asp.experiment.Exciter("120 mm"), "Exciter.frequency must be a frequency"),
         (lambda: asp.recording.Trace([0.0], {"F": [1.0]}), r"Trace.channels\['F'\] must be a Chan"),
@@ -189,7 +190,7 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.Slider(LAW, spring=-1.0, load=7.0), "slider.spring must be positive, got -1"),
         (
             lambda: asp.sensitivities(SLIDER, **{**POINT, "velocity": np.empty(0)}),
-            "at least one number",
+            "have a point",
         ),
         (lambda: asp.units.from_si(["x"], "um/s", "velocity"), "value must be a number or an arr"),
         (lambda: asp.units.from_si(1.0, 3, "velocity"), "unit must be a text, got 3"),

@@ -331,7 +331,6 @@ def _settled(slider: Slider, V: jax.Array, extremum: Any) -> SettlingDistance:
 
 def _in_batches(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
     """Run many points in calls of a few fixed sizes, so that few programs are compiled."""
-    require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
     parts = []
     for index, kept in batches(len(V), _SHAPES):
         arguments = jax.tree.map(lambda a, at=index: jnp.asarray(a[at]), (slider, V, *other))

@@ -619,7 +619,6 @@ def sensitivities(
     model = ResponseFunction.of(ParametrisedProblem.of(problem), harmonics=2, multipliers=True)
     numbers = model.equations.values(problem)
     points = int(np.prod(shape, dtype=int))
-    require(points, "parameters", "be at least one number each", "an empty array", "give a value")
     blocks = [
         model.value_and_jacobian({n: v[i : i + _BLOCK] for n, v in numbers.items()})
         for i in range(0, points, _BLOCK)

@@ -175,9 +175,10 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     Raises
     ------
     InputError
-        If the shapes do not broadcast.
+        If the shapes do not broadcast, or there is no point.
     """
     shape = broadcast_shape(name, *jax.tree.leaves(problem))
+    require(0 not in shape, name, "have a point", f"an array of shape {shape}", "give a value")
     return (
         jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), problem),
         shape,
