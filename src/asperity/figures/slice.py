@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from asperity.errors import Argument, InputError, closest, require, require_known
 from asperity.figures.map import axis_unit, label
 from asperity.figures.style import new_figure
+from asperity.parameters import MODULATION
 from asperity.parameters.arguments import file_path, number
 from asperity.study.results import dataset_of
 from asperity.study.store.store import SweepStore
-from asperity.units import KINDS
+from asperity.units import KINDS, to_radians
 
 
 def plot_slice(
@@ -106,11 +107,13 @@ def plot_slice(
 
 
 def _in_si(value: Any, unit: str, dim: str) -> float:
-    """A position in SI; a text has its unit, or is a number in SI."""
+    """A position in SI; a text has its unit, or is a number in SI (an angle in rad)."""
     kind = next(name for name, kind in KINDS.items() if (kind.si or "1") == unit)
     with suppress(ValueError):
         value = float(value)
     try:
+        if dim in MODULATION and MODULATION[dim].angle:
+            value = to_radians(value, "")
         return number(value, "", kind)
     except InputError as error:
         raise error.about(Argument("at", key=dim)) from None

@@ -19,6 +19,7 @@ from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.figures.slice import plot_slice
 from asperity.study import (
+    SweepPlan,
     export_store,
     open_store,
     reasons,
@@ -573,6 +574,15 @@ def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedFo
         export_store(out, tmp_path / "s.xlsx")
     with pytest.raises(InputError, match="out must lie outside the store"):
         export_store(out, out / "s.csv")
+
+
+def test_a_position_on_an_axis_of_angles_may_be_in_degrees(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    angles = {"epsilon": {"values": (0.1, 0.2)}, "tilt": {"values": ("2 deg", "30 deg")}}
+    run(tmp_path / "s.zarr", plan=SweepPlan(**{**dict(plan_of()), "axes": angles}))
+    curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"tilt": "25 deg"})
+    assert curve.axes[0].get_title().startswith("tilt = 0.5236")
 
 
 def test_every_run_is_on_record(tmp_path: Path, closed_form: ClosedForm) -> None:
