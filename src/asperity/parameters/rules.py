@@ -50,6 +50,12 @@ RULES: Mapping[str, Rule] = MappingProxyType(
             lambda x: np.abs(x) < np.pi / 2,
             "give the angle from the normal in rad, such as 0.03, or as a text like '2 deg'",
         ),
+        "count": Rule(
+            "be a whole number from 0",
+            # Axes at equal ratios hit whole numbers up to rounding.
+            lambda x: (x >= 0) & (np.abs(x - np.rint(x)) < 1e-6),
+            "give one, such as 3",
+        ),
         "switch": Rule(
             "be 1 or 0",
             lambda x: np.isin(x, (0.0, 1.0)),

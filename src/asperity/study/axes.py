@@ -252,12 +252,17 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     require(count > 1 or low == high, "count", rule, count, advice)
     rule = "have two different ends"
     require(count == 1 or low != high, name, rule, f"{low:g} for both", advice)
-    return spaced(low, high, count, log=spacing == "log").tolist()
+    parameter = known[_name(name, known)]
+    values = parameter.check(spaced(low, high, count, log=spacing == "log"), parameter.name)
+    return [float(value) for value in values]
 
 
 def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
     """Distribution of a drawn number, as for `_quantile`."""
     column = _name(name, known)
+    whole = column not in TEXTS and known[column].rule in ("count", "switch")
+    advice = "write it like { values = [0, 1] }"
+    require(not whole, name, "be listed, as all whole numbers are", "a distribution", advice)
     if set(table) == {"mean", "std"} and column not in TEXTS:
         parameter = known[column]
         mean = checked_value(parameter, table["mean"])

@@ -97,6 +97,19 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
         run_sweep(plan(tmp_path, axes=axes), out, workers=ThisProcess())
 
 
+def test_a_seed_that_is_no_whole_number_is_refused(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", 0)
+    drawn = {"draw": "random", "count": 5, "over": {"noise_seed": {"from": 0, "to": 9}}}
+    for axes, sentence in (
+        ({"noise_seed": {"from": 0, "to": 1, "count": 5}}, "be a whole number from 0, got 0.25"),
+        ({"noise_seed": {"values": (0, 1.5)}}, "be a whole number from 0, got 1.5"),
+        ({"s": drawn}, "noise_seed must be listed"),
+    ):
+        fractional = plan(tmp_path, fit={"free": ("A",), "data": "a.csv"}, axes=axes)
+        with pytest.raises(InputError, match=sentence):
+            run_sweep(fractional, tmp_path / "out.zarr", workers=ThisProcess())
+
+
 def test_readings_drawn_at_true_values_scatter_as_the_standard_errors_say(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", 0)
     # Readings without what the rows say of them, but with their uncertainties.

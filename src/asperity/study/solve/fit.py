@@ -58,7 +58,7 @@ _OPERATING = {"V": 1e-6, "epsilon": 0.1, "frequency": 1.0}
 NOISE_SEED = Parameter(
     "noise_seed",
     "dimensionless",
-    "not negative",
+    "count",
     "seed of the noise of simulated readings",
     place="drive",
     label="noise_seed",
