@@ -49,3 +49,17 @@ def test_a_field_takes_its_own_type_only(adapter, kind):
     for value in REFUSED[kind]:
         with pytest.raises((ValidationError, InputError)):
             adapter.validate_python(value)
+
+
+@pytest.mark.parametrize("record", sorted(records(Question), key=str))
+def test_limits_are_keywords_of_json_schema(record):
+    assert not {"ge", "gt", "le", "lt"} & set(keys_of(record.model_json_schema()))
+
+
+def keys_of(schema):
+    """All keys of a schema, of its parts too."""
+    if isinstance(schema, dict):
+        yield from schema
+        schema = list(schema.values())
+    for part in schema if isinstance(schema, list) else ():
+        yield from keys_of(part)

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from asperity.errors import InputError, MistakesError, require
 from asperity.questions.fit import Priors
-from asperity.questions.record import Given, Names, Question, Record, Whole, quantity
+from asperity.questions.record import WHOLE, Given, Names, Question, Record, quantity
 from asperity.questions.sweep import PlanError
 
 #: Readings, levels of an axis, and draws at most.
@@ -34,7 +34,7 @@ class Range(Record):
     values: tuple[Given, ...] | None = None
     from_: Given | None = Field(default=None, alias="from")
     to: Given | None = None
-    levels: Annotated[Whole, Field(ge=2, le=MOST)] = 7
+    levels: Annotated[StrictInt, Field(ge=2, le=MOST), WHOLE] = 7
     spacing: Literal["log", "linear"] | None = None
 
     @model_validator(mode="before")
@@ -128,7 +128,7 @@ class Design(Question):
     measure: Names = ()
     rival: str | None = None
     rival_free: Names | None = None
-    points: Annotated[Whole, Field(ge=1, le=MOST)] | None = None
+    points: Annotated[StrictInt, Field(ge=1, le=MOST), WHOLE] | None = None
     time: quantity("time", "positive") | None = None  # type: ignore[valid-type]
     settling_slip: quantity("length", "not negative") | None = None  # type: ignore[valid-type]
     integration: quantity("time", "not negative") | None = None  # type: ignore[valid-type]
@@ -136,12 +136,12 @@ class Design(Question):
     prior: Priors = Field(default_factory=dict)
     values: dict[str, Given] = Field(default_factory=dict)
     fixed: dict[str, Given] = Field(default_factory=dict)
-    draws: Annotated[Whole, Field(ge=0, le=_MOST_DRAWS)] = 0
+    draws: Annotated[StrictInt, Field(ge=0, le=_MOST_DRAWS), WHOLE] = 0
     uncertainty: dict[str, Given] = Field(default_factory=dict)
     usable_share: Annotated[quantity("dimensionless"), Field(gt=0, le=1)] = 0.9  # type: ignore[valid-type]
     inertia: StrictBool = False
     radiation_damping: StrictBool = False
-    seed: Annotated[Whole, Field(ge=0, le=2**31 - 1)] = 0
+    seed: Annotated[StrictInt, Field(ge=0, le=2**31 - 1), WHOLE] = 0
 
     @model_validator(mode="after")
     def _one_aim(self) -> Design:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictFloat, ValidationError, WrapValidator
+from pydantic import Field, StrictBool, StrictFloat, StrictInt, ValidationError, WrapValidator
 
 from asperity.errors import InputError, MistakesError
 from asperity.loads import ProgrammeStep
 from asperity.questions.point import Point
-from asperity.questions.record import Record, Whole, quantity, shown
+from asperity.questions.record import WHOLE, Record, quantity, shown
 
 
 class ProtocolError(MistakesError):
@@ -59,7 +59,7 @@ class Repeat(Record):
     steps : tuple of str, ProgrammeStep or Repeat
     """
 
-    repeat: Annotated[Whole, Field(gt=0)]
+    repeat: Annotated[StrictInt, Field(gt=0), WHOLE]
     steps: tuple[str | Repeat | ProgrammeStep, ...]
 
 

@@ -7,17 +7,25 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, StrictBool, StrictFloat, WrapValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    WrapValidator,
+    model_validator,
+)
 
 from asperity.errors import Argument, InputError, require
 from asperity.questions.record import (
+    WHOLE,
     Given,
     Names,
     Question,
     Record,
     Span,
     Times,
-    Whole,
     parts_of,
     quantity,
     shown,
@@ -118,8 +126,8 @@ class Estimation(Record):
     free: Names | None = None
     prior: Priors = Field(default_factory=dict)
     profile: StrictBool = False
-    starts: Annotated[Whole, Field(ge=0, le=10_000)] = 64
-    seed: Annotated[Whole, Field(ge=0)] = 0
+    starts: Annotated[StrictInt, Field(ge=0, le=10_000), WHOLE] = 64
+    seed: Annotated[StrictInt, Field(ge=0), WHOLE] = 0
 
 
 class FitOptions(Estimation):
@@ -162,7 +170,7 @@ class FitOptions(Estimation):
     drift: StrictBool = False
     initial: Literal["steady", "free"] = "steady"
     gauge: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
-    gauge_order: Annotated[Whole, Field(ge=1, le=8)] = 1
+    gauge_order: Annotated[StrictInt, Field(ge=1, le=8), WHOLE] = 1
     fit_rate: float | str | None = None
     stiffness_from: Span | None = None
 

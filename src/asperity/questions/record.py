@@ -19,7 +19,6 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
-    StrictInt,
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
@@ -216,8 +215,9 @@ def _plain_integer(value: Any) -> Any:
     return int(value) if isinstance(value, np.integer) else value
 
 
-#: A whole number; booleans and texts are refused.
-Whole = Annotated[StrictInt, BeforeValidator(_plain_integer)]
+#: Mark of a whole number, ``Annotated[StrictInt, Field(ge=1), WHOLE]``, that takes those of NumPy.
+#: It stands behind the limits, which the JSON schema does not have otherwise.
+WHOLE = BeforeValidator(_plain_integer)
 
 
 def parts_of(value: Any) -> Any:

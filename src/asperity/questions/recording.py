@@ -8,10 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Span, Times, Whole, parts_of, quantity, shown
+from asperity.questions.record import WHOLE, Question, Span, Times, parts_of, quantity, shown
 
 Column = str | int
 
@@ -154,7 +154,7 @@ class Measurement(Question):
     force: str = "F"
     frequency: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
     exact_frequency: StrictBool = False
-    harmonics: Annotated[Whole, Field(ge=1, le=64)] = 4
+    harmonics: Annotated[StrictInt, Field(ge=1, le=64), WHOLE] = 4
     window: Span | None = None
     whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictFloat, model_validator
+from pydantic import Field, StrictFloat, StrictInt, model_validator
 
 from asperity.errors import MistakesError, require
 from asperity.questions.fit import Estimation
 from asperity.questions.point import Point
-from asperity.questions.record import Given, Names, Record, Whole
+from asperity.questions.record import WHOLE, Given, Names, Record
 
 
 class PlanError(MistakesError):
@@ -41,7 +41,7 @@ class AxisTable(Record):
 
     from_: Given | None = Field(default=None, alias="from")
     to: Given | None = None
-    count: Annotated[Whole, Field(gt=0)] | None = None
+    count: Annotated[StrictInt, Field(gt=0), WHOLE] | None = None
     spacing: Literal["linear", "log"] | None = None
     values: tuple[Given, ...] | None = None
     zip: Mapping[str, tuple[Given, ...]] | None = None
@@ -84,7 +84,7 @@ class ThresholdTable(Record):
     """
 
     between: tuple[StrictFloat, StrictFloat] = (0.3, 4.0)
-    scan: Annotated[Whole, Field(gt=0, lt=2**63)] = 24
+    scan: Annotated[StrictInt, Field(gt=0, lt=2**63), WHOLE] = 24
 
 
 class NumberTable(Record):
@@ -173,8 +173,8 @@ class Sweep(Point):
     axes: Mapping[str, AxisTable]
     solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
     outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    seed: Annotated[Whole, Field(ge=0)] = 0
-    chunk: Annotated[Whole, Field(gt=0)] | None = None
+    seed: Annotated[StrictInt, Field(ge=0), WHOLE] = 0
+    chunk: Annotated[StrictInt, Field(gt=0), WHOLE] | None = None
     threshold: ThresholdTable = ThresholdTable()
     transient: TransientTable | None = None
     fit: FitTable | None = None

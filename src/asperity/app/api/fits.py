@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StrictBool
+from pydantic import Field, StrictBool, StrictInt
 
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source
@@ -30,7 +30,7 @@ from asperity.outputs.sections import records
 from asperity.parameters import Names, canonical_name
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
-from asperity.questions.record import Span, Times, Whole
+from asperity.questions.record import WHOLE, Span, Times
 from asperity.questions.recording import Velocities
 from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
@@ -96,8 +96,8 @@ class Fitted(Question, FitOptions):
     rows: Annotated[tuple[dict[str, Cell], ...], Field(max_length=1000)] = ()
     runs: Annotated[tuple[Run, ...], Field(max_length=10)] = ()
     posterior: StrictBool = False
-    chains: Annotated[Whole, Field(ge=2, le=8)] = 4
-    draws: Annotated[Whole, Field(ge=100, le=10_000)] = 1000
+    chains: Annotated[StrictInt, Field(ge=2, le=8), WHOLE] = 4
+    draws: Annotated[StrictInt, Field(ge=100, le=10_000), WHOLE] = 1000
     report: StrictBool = False
     names: Names = "friction"
 

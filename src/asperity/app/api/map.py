@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StrictBool
+from pydantic import Field, StrictBool, StrictInt
 
 from asperity.app.api import as_code
 from asperity.app.api.operating_point import Name, OperatingPoint, Value
@@ -14,7 +14,7 @@ from asperity.app.endpoints import Answer, Job, Question
 from asperity.errors import require
 from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
-from asperity.questions.record import Whole
+from asperity.questions.record import WHOLE
 from asperity.study.map import SHOWN, Axis, response_map
 from asperity.study.map.dataset import boundary_lines
 
@@ -49,7 +49,7 @@ class MapQuestion(OperatingPoint):
     x: MapAxis
     y: MapAxis
     show: Name = "growth_rate"
-    count: Annotated[Whole, Field(ge=2, le=_FINEST)] = 64
+    count: Annotated[StrictInt, Field(ge=2, le=_FINEST), WHOLE] = 64
 
     def axes(self, count: int) -> tuple[Axis, Axis]:
         """Axes with `count` points each."""
