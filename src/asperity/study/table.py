@@ -2,7 +2,8 @@
 
 Input columns are SI numbers, or have their unit in the heading, as ``V (um/s)``. They are named
 ``law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon, frequency``, and as the further
-parameters of registered laws. The output has the input columns, decimal commas written as points,
+parameters of registered laws, and ``eps_ratio``, the share of epsilon that the contacts carry where
+it is the applied amplitude. The output has the input columns, decimal commas written as points,
 followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives
 the reason; the other rows are solved. Rows are read, solved and written in chunks, so that memory
 does not grow with the table.
@@ -23,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.errors import Argument, InputError, require
+from asperity.inference.unknowns import EPS_RATIO
 from asperity.laws import Law, get_law, registered
 from asperity.operating_point import known_parameters, require_influence
 from asperity.orbit.outcome import Outcome
@@ -204,7 +206,7 @@ class TableSource:
     ) -> None:
         self.path, self.law, self.filled = path, law or "", filled
         require_rereadable(path, "table")
-        parameters = known_parameters()
+        parameters = _numbers_of_tables()
         self._sheet = sheet(path, parameters.__contains__, label="table")
         self.delimiter, self.header = self._sheet.delimiter, self._sheet.heading
         rule, advice = "have a line of column names and rows", "give one operating point a row"
@@ -278,6 +280,11 @@ class TableSource:
             raise InputError(str(self.path), rule, got, "add them or name a material that has them")
 
 
+def _numbers_of_tables() -> dict[str, Parameter]:
+    """Columns of numbers: the parameters, and the share of epsilon that the contacts carry."""
+    return {**known_parameters(), EPS_RATIO.name: EPS_RATIO}
+
+
 def _checked_header(header: Sequence[str], label: str) -> tuple[dict[str, int], dict[str, float]]:
     """Position of every known column, and the SI value of the unit in its heading.
 
@@ -293,7 +300,7 @@ def _checked_header(header: Sequence[str], label: str) -> tuple[dict[str, int], 
     InputError
         If a column occurs twice, is named like a result, or looks like a misspelt known one.
     """
-    parameters = known_parameters()
+    parameters = _numbers_of_tables()
     known = {"law", *parameters}
     for name in map(str.strip, header):
         meant = None if name in known else _nearest(name, known)
@@ -353,7 +360,7 @@ def _points(table: TableSource, rows: Sequence[Row]) -> Points:
     for name, place in table.columns.items():
         if name == "law":
             continue
-        cells, parameter = [row[place] for row in rows], known_parameters()[name]
+        cells, parameter = [row[place] for row in rows], _numbers_of_tables()[name]
         try:
             numbers = np.fromiter(map(cell_number, cells), float, len(cells))
             usual = bool(np.isfinite(numbers).all())
@@ -363,6 +370,9 @@ def _points(table: TableSource, rows: Sequence[Row]) -> Points:
             numbers = np.array([_number(cell.strip(), parameter) for cell in cells])
         numbers = numbers * table.units.get(name, 1.0)
         values[name] = np.where(np.isnan(numbers), table.filled.get(name, math.nan), numbers)
+    if EPS_RATIO.name in values:
+        share = values.pop(EPS_RATIO.name)
+        values["epsilon"] = values["epsilon"] * np.where(np.isnan(share), 1.0, share)
     return Points(laws, values)
 
 
@@ -388,7 +398,7 @@ def _mistake(law: type[Law], values: Mapping[str, float], cells: Mapping[str, st
         if math.isinf(values[name]):
             unit = f" in {parameter.unit}" if parameter.unit else ""
             return (
-                f"{name} must be a finite number{unit}, got '{cells[name]}'; write it without "
+                f"{name} must be a finite number{unit}, got '{cells.get(name)}'; write it without "
                 "unit, with a decimal point"
             )
         try:

@@ -160,6 +160,22 @@ def test_the_table_of_a_campaign_is_fitted_as_written(recorded, tmp_path, pmma):
     assert result.converged
 
 
+def test_a_row_is_named_by_its_place_in_the_file(tmp_path):
+    path, head = tmp_path / "table.csv", "kind,V,epsilon,frequency,mu1,mu1_err\n"
+    for wrong in ("0.01,-1", "0.01,x", "-2,0.1"):
+        rows = f"stick-slip,,,,,\namplitude,1e-6,0.1,120,{wrong}\n"
+        path.write_text(head + rows, encoding="utf-8")
+        with pytest.raises(InputError, match=" in row 2; "):
+            read_table(path)
+
+
+def test_the_share_of_a_design_is_not_left_out_in_silence(tmp_path):
+    path = tmp_path / "table.csv"
+    row = "1e-6,0.1,120,0.01,0.001,0.48"
+    path.write_text(f"V,epsilon,frequency,mu1,mu1_err,eps_ratio\n{row}\n", encoding="utf-8")
+    assert "the column eps_ratio of table.csv is not read" in read_table(path).remarks[0]
+
+
 def test_units_are_read_from_headings(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text(

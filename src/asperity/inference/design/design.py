@@ -265,11 +265,12 @@ class Design(Warned):
 
         Columns: law, all parameters in SI, ``inertia`` = 1 if the mass counts, `readings`,
         `predicted_NAME` of each observable and `NAME_err`, the standard uncertainty of one reading.
-        `epsilon` is the applied amplitude; the contacts carry eps_ratio times this amplitude.
+        `epsilon` is the applied amplitude; if the contacts carry a share of it, `eps_ratio` is it.
         """
         truth = self.plan.truth
         constants = {**truth.fixed, **expected_values(truth)}
-        constants.pop("eps_ratio", None)
+        if constants["eps_ratio"] == 1:
+            del constants["eps_ratio"]
         if self.plan.question.inertia:
             constants["inertia"] = 1
         rows = []

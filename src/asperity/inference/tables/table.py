@@ -215,6 +215,8 @@ def read_table(
     level = (kind == "level") & np.isin(texts.get("epsilon", blank), ("0", "0.0"))
     kept = ~failed & (np.isin(kind, ("", "amplitude")) | level)
     remarks = []
+    if any(heading.strip() == "eps_ratio" for heading in csv.heading):
+        remarks.append(f"the column eps_ratio of {shown} is not read: fix or free eps_ratio")
     if not kept.any():
         raise InputError(
             f"{shown} must have lock-in readings, got none: every row is another kind of "
@@ -227,8 +229,9 @@ def read_table(
             f"first of them row {np.argmin(kept) + 1}"
         )
     texts = {n: column[kept] for n, column in texts.items()}
+    names = [f"row {i + 1}" for i in np.flatnonzero(kept)]
     columns: dict[str, Any] = {
-        n: _numbers(shown, n, column) for n, column in texts.items() if n not in _TEXTS
+        n: _numbers(shown, n, column, names) for n, column in texts.items() if n not in _TEXTS
     }
     for n, unit in units.items():
         if n in columns:
@@ -236,8 +239,8 @@ def read_table(
     if _UNIT in texts and "W0" in columns and "W0" not in units:
         columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT].tolist())
     run = next((texts[n].tolist() for n in _RUN if n in texts), None)
-    table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
-    return replace(table, row_names=np.array([f"row {i + 1}" for i in np.flatnonzero(kept)]))
+    columns = _given(columns, given)
+    return table_of(columns, name=shown, run=run, remarks=remarks, row_names=names)
 
 
 def _columns(
@@ -320,7 +323,7 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
     return columns
 
 
-def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
+def _numbers(shown: str, name: str, cells: NDArray[np.str_], row_names: Sequence[str]) -> Float:
     """Numbers of a column; NaN in empty cells."""
     values = np.full(cells.size, math.nan)
     for row, cell in enumerate(cells.tolist()):
@@ -328,7 +331,7 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
             values[row] = cell_number(cell) if cell else math.nan
         except ValueError:
             rule = f"have numbers without unit in column {name}"
-            got = f"{shown_value(cell)} in row {row + 1}"
+            got = f"{shown_value(cell)} in {row_names[row]}"
             advice = "write it with a decimal point, and the unit into the heading"
             raise InputError(shown, rule, got, advice) from None
     return values
@@ -341,6 +344,7 @@ def table_of(
     name: str = "data",
     run: Sequence[str] | None = None,
     remarks: Sequence[str] = (),
+    row_names: Sequence[str] | None = None,
 ) -> LockInTable:
     """A table from columns in memory.
 
@@ -354,6 +358,8 @@ def table_of(
         Run of each row; by default one run.
     remarks : sequence of str
         Sentences on the reading of the table so far.
+    row_names : sequence of str, shape (rows,), optional
+        Names of the rows in messages; by default "row 1" and so on.
 
     Raises
     ------
@@ -369,6 +375,8 @@ def table_of(
             rule, advice = "be numbers in SI", "convert it, as asperity.units.to_si does"
             raise InputError(f"{name}.{key}", rule, shown_value(columns[key]), advice) from None
     rows = max((a.size for a in arrays.values()), default=0)
+    if row_names is None:
+        row_names = [f"row {i}" for i in range(1, rows + 1)]
     _fill_frequency(arrays)
     points: dict[str, Float] = {}
     observed: dict[str, Float] = {}
@@ -381,11 +389,19 @@ def table_of(
             # An empty cell means 0: a harmonic load.
             rule = "be 0, since fits are to a harmonic load"
             zero = np.nan_to_num(column) == 0
-            _require(zero, name, key, column, rule, "leave those rows out")
+            _require(row_names, zero, name, key, column, rule, "leave those rows out")
         elif parameter is not None:
             _require_one_column(name, parameter, key, parameter in points)
             advice = "fill the cell in or leave the row out"
-            _require(np.isfinite(column), name, parameter, column, "be a finite number", advice)
+            _require(
+                row_names,
+                np.isfinite(column),
+                name,
+                parameter,
+                column,
+                "be a finite number",
+                advice,
+            )
             points[parameter] = np.asarray(known[parameter].check(column, f"{name}.{parameter}"))
         elif key in _PAIRS:
             pair = " and ".join(_PAIRS[key])
@@ -401,7 +417,7 @@ def table_of(
             # Without a column or cell, epsilon is exact.
             spread = np.nan_to_num(column)
             good = np.isfinite(spread) & (spread >= 0)
-            _require(good, name, key, column, "be finite and not negative", "correct it")
+            _require(row_names, good, name, key, column, "be finite and not negative", "correct it")
             of_epsilon["epsilon"] = spread
         elif (plain := _observable_of(key)) is not None:
             _require_one_column(name, plain, key, plain in observed)
@@ -413,12 +429,14 @@ def table_of(
             f"{', '.join(missing)}; add them in SI, or use {Argument('fixed', missing[0])} where "
             "all rows have the same"
         )
-    values, errors = _observables(name, observed)
+    values, errors = _observables(name, observed, row_names)
     holds = run is None or len(run) == rows
     require(holds, "run", f"have {rows} names", len(run or ()), "give the run of each row")
     runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])
     errors |= of_epsilon
-    table = LockInTable(name, points, values, errors, covariances, runs, tuple(remarks))
+    table = LockInTable(
+        name, points, values, errors, covariances, runs, tuple(remarks), np.array(row_names)
+    )
     _refuse_copies(table, table, "{0} must have each reading once, got {2} equal to {1}")
     _refuse_impossible(table)
     return _without_copies(table)
@@ -467,15 +485,23 @@ def _known() -> Mapping[str, Any]:
     return all_parameters(registered().values())
 
 
-def _require(good: Bool, table: str, column: str, values: Float, rule: str, advice: str) -> None:
+def _require(
+    row_names: Sequence[str],
+    good: Bool,
+    table: str,
+    column: str,
+    values: Float,
+    rule: str,
+    advice: str,
+) -> None:
     """Refuse a column with the first row that breaks a rule."""
     if not good.all():
         row = int(np.argmin(good))
-        raise InputError(f"{table}.{column}", rule, f"{values[row]:g} in row {row + 1}", advice)
+        raise InputError(f"{table}.{column}", rule, f"{values[row]:g} in {row_names[row]}", advice)
 
 
 def _observables(
-    table: str, observed: Mapping[str, Float]
+    table: str, observed: Mapping[str, Float], row_names: Sequence[str]
 ) -> tuple[dict[str, Float], dict[str, Float]]:
     values = {n: observed[n] for n in OBSERVABLES if n in observed}
     if not values:
@@ -485,7 +511,7 @@ def _observables(
         )
     errors = {}
     for name, column in values.items():
-        _require_possible(table, name, column)
+        _require_possible(table, name, column, row_names)
         if f"{name}_err" not in observed:
             raise InputError(
                 f"{table} must have the standard uncertainty of {name}, got no column {name}_err; "
@@ -494,12 +520,14 @@ def _observables(
         error, absent = observed[f"{name}_err"], ~np.isfinite(column)
         advice = "give the standard uncertainty"
         good = absent | (np.isfinite(error) & (error > 0))
-        _require(good, table, f"{name}_err", error, "be a finite positive number", advice)
+        _require(
+            row_names, good, table, f"{name}_err", error, "be a finite positive number", advice
+        )
         # Values are of order 1: no uncertainty lies below the spacing of doubles, or as far above
         # 1.
         good = absent | ((error >= _SMALLEST_ERROR) & (error <= 1 / _SMALLEST_ERROR))
         rule = f"be from {_SMALLEST_ERROR:g} to {1 / _SMALLEST_ERROR:g}"
-        _require(good, table, f"{name}_err", error, rule, advice)
+        _require(row_names, good, table, f"{name}_err", error, rule, advice)
         errors[name] = error
     for phase, amplitude in (("phase1", "mu1"), ("phase2", "mu2")):
         if phase not in values:
@@ -507,7 +535,7 @@ def _observables(
         absent = ~np.isfinite(values.get(amplitude, np.full_like(values[phase], math.nan)))
         alone = np.isfinite(values[phase]) & absent
         if amplitude not in values or alone.any():
-            got = f"an empty cell in row {np.argmax(alone) + 1}"
+            got = f"an empty cell in {row_names[int(np.argmax(alone))]}"
             raise InputError(
                 f"{table} must have {amplitude} where it has {phase}, got "
                 f"{got if amplitude in values else 'no such column'}; a phase weighs as much as "
@@ -516,7 +544,7 @@ def _observables(
     return values, errors
 
 
-def _require_possible(table: str, name: str, column: Float) -> None:
+def _require_possible(table: str, name: str, column: Float, row_names: Sequence[str]) -> None:
     """Refuse infinite values, wrong signs, and phases or forces in other units."""
     size = np.abs(column)
     rules = [(np.isinf(column), "be finite", "leave the cell empty")]
@@ -531,7 +559,7 @@ def _require_possible(table: str, name: str, column: Float) -> None:
         limit = f"be a force over W0, below {_LARGEST_FRICTION:g}"
         rules.append((size >= _LARGEST_FRICTION, limit, "divide by the load, or convert per cent"))
     for bad, rule, advice in rules:
-        _require(~bad, table, name, column, rule, advice)
+        _require(row_names, ~bad, table, name, column, rule, advice)
 
 
 def _refuse_impossible(table: LockInTable) -> None:
@@ -552,7 +580,7 @@ def _refuse_impossible(table: LockInTable) -> None:
         i, j = np.unravel_index(int(np.argmax(upper)), upper.shape)
         raise InputError(
             f"{table.name} must have a positive definite covariance of the observables of a row, "
-            f"got one of row {row + 1} that is not, with a correlation of "
+            f"got one of {table.row_names[row]} that is not, with a correlation of "
             f"{correlation[row, i, j]:.4g} between {OBSERVABLES[i]} and {OBSERVABLES[j]}; check "
             "the covariances against the squares of the uncertainties"
         )
