@@ -15,6 +15,7 @@ from asperity.inference.answers import read_data
 from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.inference.report import fit_in_words
+from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun
 from asperity.laws import RiceRuina
 from asperity.measurement.from_file import reads_cycles
@@ -98,6 +99,13 @@ def test_files_with_the_drive_bring_their_velocities(tmp_path):
     question = Fit(data=[{"file": file} for file in files], fixed=MACHINE | {"W0": "1 N"})
     slow, fast = read_data(question)
     assert pytest.approx((V, 4 * V), rel=1e-6) == (slow.V, fast.V)
+    # No gauge is applied to cycles, and no trend.
+    with pytest.raises(InputError, match="gauge must go with velocity steps and holds, got 50 Hz"):
+        read_data(question.model_copy(update={"gauge": "50 Hz"}))
+    with pytest.raises(InputError, match="runs must go with recorded runs"):
+        fit(slow, "rice-ruina", runs=RunOptions(gauge=(1, 50.0)), fixed=MACHINE)
+    with pytest.raises(InputError, match="data must have different names, got slow, slow"):
+        fit([slow, replace(fast, name="slow")], "rice-ruina", fixed=MACHINE)
 
 
 def test_velocity_steps_that_fall_like_slips_are_no_stick_slip(tmp_path):

@@ -128,17 +128,8 @@ def read_data(
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
             got = f"{recordings} of them" if recordings else "a table"
             raise InputError(name, "go with one recording", got, "leave it out")
-    # Readings in a table are final: nothing would apply a gauge or a trend to them.
-    for name in (
-        () if recordings else ("trend", "drift", "initial", "gauge", "gauge_order", "fit_rate")
-    ):
-        value = getattr(question, name)
-        same = value == type(question).model_fields[name].default
-        # Those that are numbers are frequencies.
-        got = (
-            f"{value:g} Hz" if isinstance(value, float) else "it" if value is True else shown(value)
-        )
-        require(same, name, "go with a recording", f"{got} with a table", "leave it out")
+    if not recordings:
+        _refuse_options_of_runs(question, "a recording", "a table")
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }
@@ -164,7 +155,23 @@ def read_data(
             if data.steps is None and data.velocities is None:
                 cycle = _stick_slip(trace, reading["name"], question.fixed, data.window)
             result.append(cycle or recorded_run(trace, window=data.window, **reading))
+    if any(isinstance(d, AveragedCycle) for d in result):
+        _refuse_options_of_runs(question, "velocity steps and holds", "the cycles of stick-slip")
     return result
+
+
+def _refuse_options_of_runs(
+    question: questions.Fit | questions.Comparison, needed: str, data: str
+) -> None:
+    """Refuse options of recorded runs for other data: nothing would apply a gauge or a trend."""
+    for name in ("trend", "drift", "initial", "gauge", "gauge_order", "fit_rate"):
+        value = getattr(question, name)
+        same = value == type(question).model_fields[name].default
+        # Those that are numbers are frequencies.
+        got = (
+            f"{value:g} Hz" if isinstance(value, float) else "it" if value is True else shown(value)
+        )
+        require(same, name, f"go with {needed}", f"{got} with {data}", "leave it out")
 
 
 def _recording(data: questions.Data, read: Reader) -> Trace:

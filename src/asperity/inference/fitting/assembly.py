@@ -131,7 +131,12 @@ def objective_of(
     rule, advice = "have different names", "give names, or each file once"
     require(len({*called}) == len(called), "recordings", rule, ", ".join(called), advice)
     names = list(free)
+    others = options in (None, RunOptions()) or bool(recordings)
+    require(others, "runs", "go with recorded runs", "options of runs alone", "leave it out")
     if cycles:
+        once, called = len({c.name for c in cycles}) == len(cycles), [c.name for c in cycles]
+        advice = "give names, or each file once"
+        require(once, "data", "have different names", ", ".join(called), advice)
         # A cycle needs a mass.
         require_counted(given.fixed, motion, ("M", "inertia"), "cycles of stick-slip")
         return _of_cycles(law, cycles, names, given)
