@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 import asperity as asp
+from asperity.measurement.curves import mean_cycle
 from references.populations import draws
 
 measure = partial(asp.measure, modulated=True)
@@ -136,6 +137,22 @@ def test_coarse_steps_of_the_recorder_are_named_in_a_force_that_settles(trace) -
     check = next(c for c in measurement.checks if c.name == "resolution")
     assert check.verdict == "suspicious"
     assert check.number == pytest.approx(0.5, rel=0.2)
+
+
+@pytest.mark.parametrize(("amplitude", "bend"), [(0.03, 0.0), (0.0, 0.02)])
+def test_the_mean_cycle_is_without_what_is_slow(trace, amplitude, bend) -> None:
+    time, load, force = recording(np.random.default_rng(1), 4.0, 0.2, amplitude)
+    begin = modulation_start(time, load) + 0.05
+    # Few periods, over which a parabola and a settling do not cancel.
+    force = force + 7 * bend * ((time - begin) / 0.05) ** 2
+    reduced = measure(trace(time, load, force), window=(begin, begin + 0.05), detrend="quadratic")
+    if amplitude:
+        reduced = measure(trace(time, load, force), window=(begin, begin + 3.5))
+        assert reduced.reading.settling is not None
+    cycle = mean_cycle(reduced)
+    fitted = np.interp(cycle.phase, cycle.fine_phase, cycle.fitted)
+    assert np.abs(np.mean(cycle.measured - fitted)) < 2e-4
+    assert np.std(cycle.measured - fitted) < 2e-3
 
 
 @draws(3, 8)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from asperity.arrays import Bool, Float
 from asperity.lock_in.reference import spectrum
 
 if TYPE_CHECKING:
+    from asperity.lock_in.reading import LockInReading
     from asperity.measurement.measure import Measurement
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
@@ -25,7 +27,7 @@ class MeanCycle(NamedTuple):
     phase : array, shape (n,)
         Over 2 pi, in the middles of the bins.
     measured : array, shape (n,)
-        Mean of F/W0 - mean_friction in each bin, without the fitted drift.
+        Mean of F/W0 - mean_friction in each bin, without the fitted drift and settling.
     fine_phase, fitted : array, shape (m,)
         Sum of the fitted harmonics.
     """
@@ -45,18 +47,22 @@ def mean_cycle(measurement: Measurement) -> MeanCycle:
     """
     reading, cut = measurement.reading, slice(*measurement.window)
     time, force = measurement.samples.time[cut], measurement.samples.force[cut]
-    middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
-    trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
-    phase = reading.cycles(time)
+    friction, phase = reading.without_settling(time, force) / reading.W0, reading.cycles(time)
+    level = Polynomial.fit(time, friction - _harmonics(reading, phase), reading.drift.shape[1])
     where = ((phase % 1.0) * _BINS).astype(int) % _BINS
     samples = np.bincount(where, minlength=_BINS)
-    mean = np.bincount(where, force - trend, minlength=_BINS) / np.maximum(samples, 1) / reading.W0
-    middles = (np.arange(_BINS) + 0.5) / _BINS
+    mean = np.bincount(where, friction - level(time), minlength=_BINS) / np.maximum(samples, 1)
     filled = samples > 0
-    fine = np.linspace(0, 1, 400)
-    order = np.arange(1, reading.harmonics.size + 1)[:, None]
-    fitted = (reading.harmonics[:, None] * np.exp(2j * np.pi * order * fine)).real.sum(0)
-    return MeanCycle(middles[filled], (mean - reading.mean_friction)[filled], fine, fitted)
+    middles, fine = ((np.arange(_BINS) + 0.5) / _BINS)[filled], np.linspace(0, 1, 400)
+    return MeanCycle(middles, mean[filled], fine, _harmonics(reading, fine))
+
+
+def _harmonics(reading: LockInReading, phase: Float) -> Float:
+    """Sum of the fitted harmonics of F/W0 at phases over 2 pi."""
+    fitted = np.zeros(phase.shape)
+    for n, harmonic in enumerate(reading.harmonics, 1):
+        fitted += (harmonic * np.exp(2j * np.pi * n * phase)).real
+    return fitted
 
 
 def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
