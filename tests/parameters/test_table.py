@@ -26,6 +26,7 @@ from asperity.parameters import (
     point_parameters,
     symbol_of,
 )
+from asperity.parameters.table import parameter_named
 from asperity.slider import equation_of_motion
 from asperity.slider.parameters import equation_parameters, value_of, with_value
 from asperity.slider.problem import Problem
@@ -170,6 +171,14 @@ def test_names_of_geophysics_are_those_of_the_table() -> None:
     assert symbol_of(MACHINE["W0"], "geophysics") == r"\bar\sigma_n"
     assert symbol_of(DRIVE["frequency"], "geophysics") == "f"
     assert [display_name(text) for text in texts] == list(texts)
+
+
+def test_a_parameter_of_ones_own_law_keeps_its_name_in_geophysics() -> None:
+    class Mine(registered()["rice-ruina"]):
+        k: float = parameter("k", "dimensionless")
+
+    assert [parameter_named(name, Mine) for name in ("k", "a", "Dc")] == ["k", "A", "D0"]
+    assert parameter_named("k", registered()["rice-ruina"]) == "K"
 
 
 def test_the_run_of_a_parameter_keeps_its_name() -> None:

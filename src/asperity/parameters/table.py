@@ -219,8 +219,13 @@ def display_name(name: str, names: Names = "friction", *laws: type) -> str:
 
 
 def parameter_named(name: str, law: Any = None) -> str:
-    """The name of a parameter from its name in geophysics: D0 for ``D_c`` or ``Dc``."""
+    """The name of a parameter from its name in geophysics: D0 for ``D_c`` or ``Dc``.
+
+    A name that the law itself has is that of its own parameter, as ``k`` of a law of the user.
+    """
     laws = () if law is None else (law,)
+    if name in all_parameters(laws):
+        return name
     known = {_folded(usual): parameter for parameter, usual in plain_names(*laws).items()}
     return known.get(_folded(name), name)
 
