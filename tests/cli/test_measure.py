@@ -338,6 +338,7 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
         (["--no-modulation", "--holds", "5"], "--holds must be START:END"),
         (["--no-modulation", "--holds", "5:"], "--holds must have a start and an end"),
         (["--no-modulation", "--amplitudes"], "--amplitudes must go without"),
+        (["--amplitudes", "--set", "V=1 um/s"], "--amplitudes must go without --set and --cond"),
         (["--resume"], "--resume, --jobs and --thresholds must go with --out"),
         (["--out", "table.txt"], "--out must be a CSV or a NetCDF file"),
         (["--out", "table.csv", "--plot", "a.png"], "must go with one recording without --out"),

@@ -4,6 +4,7 @@ import json
 import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -229,3 +230,12 @@ def test_a_missing_option_of_a_map(asperity, tmp_path, monkeypatch, missing) -> 
 def test_a_map_without_numbers_is_told(asperity, tmp_path) -> None:
     call = ("map", "--law", "rice-ruina", *AXES, "-V", "1 um/s", "-f", "120 Hz")
     refused(asperity(*call, "--out", tmp_path / "m.nc"), "got none for mu0, A, B, D0, V0, W0")
+
+
+def test_steady_sliding_has_no_figure_of_stick_slip(asperity, tmp_path, monkeypatch) -> None:
+    steady = SimpleNamespace(result="no stick-slip", slips=0, steady=True, values=list)
+    monkeypatch.setattr("asperity.experiment.stick_slip_response", lambda *_, **__: steady)
+    point, picture = (*POINT[:4], "--material", "bureau2000"), tmp_path / "cycle.png"
+    result = asperity("response", *point, "--stick-slip", "--plot", picture)
+    assert result.exit_code == 0
+    assert f"there is no figure {picture}: no stick-slip" in result.stderr

@@ -193,6 +193,8 @@ def _stick_slip(point: Point, output: Output) -> int:
     )
     if result.slips:
         output.draw(result.plot)
+    elif output.plot is not None:
+        say(f"there is no figure {output.plot}: {result.result}")
     return 0 if result.slips or result.steady else 1
 
 
