@@ -226,6 +226,15 @@ def test_a_table_of_modulated_and_unmodulated_files(asperity, recording, step, t
     assert abs(float(rows[1]["change"]) + 0.003) < 5 * float(rows[1]["change_uncertainty"])
 
 
+def test_a_stated_load_that_a_file_of_a_table_contradicts_is_its_reason(
+    asperity, recording, tmp_path
+) -> None:
+    out = tmp_path / "campaign.csv"
+    result = asperity("measure", recording, "--out", out, "--set", "W0=50 N")
+    assert result.exit_code == 1
+    assert "--set W0 must agree with the recorded load, 7 N, got 50.0 N" in out.read_text()
+
+
 def test_a_file_that_is_not_there(asperity, tmp_path) -> None:
     refused(asperity("measure", tmp_path / "none.csv"))
 

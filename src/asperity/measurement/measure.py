@@ -15,7 +15,7 @@ from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
 from asperity.lock_in.rounding import rounding_variance, step_of, with_rounding
-from asperity.measurement.samples import Samples, about_window, usable
+from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
 from asperity.measurement.series import (
     MeanLevel,
     Rate,
@@ -240,6 +240,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         refine=not question.exact_frequency,
         settles=True,
     )
+    require_stated_load(question.normal_load, reading.W0, samples.unit)
     steps = step_of(load), step_of(force)
     reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if window is None else "user"

@@ -162,6 +162,14 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
     raise InputError("measure.force", "agree with the recorded friction", got, advice)
 
 
+def require_stated_load(stated: float | None, recorded: float, unit: str) -> None:
+    """Refuse a stated W0 (N) that the recorded mean load, in newtons too, contradicts."""
+    rule, got = f"agree with the recorded load, {abs(recorded):.4g} N", f"{stated} N"
+    other = stated is not None and unit == "N"
+    agree = not other or abs(stated - abs(recorded)) <= CONTRADICTS * abs(recorded)
+    require(agree, "measure.normal_load", rule, got, "leave it out, or correct one of them")
+
+
 def _friction(trace: Trace) -> Channel | None:
     return trace.channel("friction") if trace.has("friction") else None
 

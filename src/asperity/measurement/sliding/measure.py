@@ -10,7 +10,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument
 from asperity.lock_in.demodulation import DRIFTS
-from asperity.measurement.samples import about_channels
+from asperity.measurement.samples import about_channels, require_stated_load
 from asperity.measurement.series import (
     MeanLevel,
     Rate,
@@ -165,6 +165,8 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     """
     steps, holds, detrend = question.steps, question.holds, question.detrend
     signals = sliding_signals(trace, question.load, question.force, question.window)
+    if signals.load is not None:
+        require_stated_load(question.normal_load, float(np.mean(signals.load)), signals.load_unit)
     time, friction = signals.time, signals.friction
     # Without times of the user the displacement shows where to cut.
     times = None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.errors import Argument, InputError, require
-from asperity.measurement.samples import CONTRADICTS, about_channels
+from asperity.errors import Argument, InputError
+from asperity.measurement.samples import about_channels, require_stated_load
 from asperity.measurement.sliding.signals import (
     SlidingSignals,
     sliding_signals,
@@ -281,9 +281,7 @@ def _machine(question: Question, signals: SlidingSignals, events: SlipEvents) ->
     load, velocity = question.normal_load, question.velocity
     if signals.load is not None and signals.load_unit == "N":
         recorded = float(np.mean(signals.load))
-        rule, got = f"agree with the recorded load, {recorded:.4g} N", f"{load} N"
-        agree = load is None or abs(load - recorded) <= CONTRADICTS * abs(recorded)
-        require(agree, "measure.normal_load", rule, got, "leave it out, or correct one of them")
+        require_stated_load(load, recorded, signals.load_unit)
         load = recorded if load is None else load
     if load is None and signals.load is None and question.mass is not None:
         load = question.mass * GRAVITY
