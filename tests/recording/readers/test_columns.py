@@ -131,8 +131,8 @@ def test_a_row_of_units_that_contradicts_the_headings_is_refused(recording):
 
 
 def test_an_index_n_above_another_unit_is_no_newton(recording):
-    trace = read(recording("time_s,F_N,mu,x_um", "s,kN,-,um", *ROWS))
-    assert list(trace.channels) == ["F_N", "mu", "x"]
+    trace = read(recording("time_s,F_N,F/N,x_um", "s,kN,-,um", *ROWS))
+    assert list(trace.channels) == ["F_N", "F/N", "x"]
     assert trace.channel("W").values[0] == 1000
 
 

@@ -112,14 +112,16 @@ def assemble(
 def _names_and_units(columns: Sequence[RawColumn]) -> list[tuple[str, list[str]]]:
     """Name of each column, and the units in its heading and next to it; at least one, maybe empty.
 
-    What follows an underscore is part of the name where the file states another unit, as F_N in kN.
+    What follows an underscore or a slash is part of the name where the file states another unit, as
+    of F_N in kN and of F/N, a pure number.
     """
     split = []
     for column, (name, unit) in zip(columns, split_labels([c.label for c in columns]), strict=True):
         stated = "" if is_empty(column.unit or "") else without_brackets(column.unit or "")
-        suffixed = column.label.strip().removeprefix(f"{name}_").replace("_", "/") == unit
-        if stated and suffixed and understood(stated) != understood(unit):
-            name, unit = column.label.strip(), ""
+        label = column.label.strip()
+        joined = label.replace(" ", "") in (f"{name}_{unit.replace('/', '_')}", f"{name}/{unit}")
+        if stated and joined and understood(stated) != understood(unit):
+            name, unit = label, ""
         split.append((name, [text for text in (unit, stated) if text] or [""]))
     return split
 
