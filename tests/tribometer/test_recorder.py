@@ -6,7 +6,12 @@ import pytest
 from asperity.errors import InputError
 from asperity.recording import Channel, Trace, read
 from asperity.recording.writers import write
-from asperity.tribometer.sensors import DisplacementGauge, LoadCell, SpringGauge
+from asperity.tribometer.sensors import (
+    Accelerometer,
+    DisplacementGauge,
+    LoadCell,
+    SpringGauge,
+)
 from asperity.tribometer.tribometer import Recorder, Tribometer, channel_gain
 
 RATE, F = 20_000.0, 120.0
@@ -81,6 +86,13 @@ def test_the_converter_has_steps_and_limits() -> None:
     # An error evenly spread over a step.
     assert (values - exact)[inside].std() == pytest.approx(step / np.sqrt(12), rel=0.1)
     assert [f.name for f in recorded(recorder).findings] == ["saturation"]
+
+
+def test_a_converter_without_steps_has_limits_too() -> None:
+    recorder = Recorder(rate="2 kHz", bits=0, ranges={"normal force": ("0 N", "8.16 N")})
+    values = recorded(recorder).channels["normal force"].values
+    exact = recorded(Recorder(rate="2 kHz")).channels["normal force"].values
+    np.testing.assert_array_equal(values, np.minimum(exact, 8.16))
 
 
 def test_a_recording_keeps_its_clock_and_where_it_comes_from() -> None:
@@ -187,6 +199,8 @@ def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
         (lambda t, p: write(t, p / "nowhere" / "x.csv"), "folder that exists"),
         (lambda t, p: Recorder(rate="0 Hz"), "Recorder.rate must be positive"),
         (lambda t, p: Recorder(rate="1 kHz", bits=40), "Recorder.bits"),
+        # It would add the mean to a signal that has it.
+        (lambda t, p: Accelerometer(bandwidth=1e3, mean=7, high_pass=0), "high_pass must be posit"),
         (lambda t, p: Recorder(rate="1 kHz", cut_off="100 Hz", order=0), "Recorder.order"),
         (lambda t, p: Recorder(rate="1 kHz", order="4"), "order must be a whole number, got '4'"),
         (lambda t, p: Recorder(rate="1 kHz", bits=16.5), "bits must be a whole number, got 16.5"),

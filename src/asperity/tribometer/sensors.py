@@ -164,7 +164,10 @@ _KINDS = {
     "stiffness": "stiffness",
 }
 #: Rules of the fields that may not be zero, or that may be negative.
-_RULES = {"bandwidth": "positive", "stiffness": "positive", "offset": "finite", "drift": "finite"}
+_RULES = {
+    **dict.fromkeys(("bandwidth", "high_pass", "stiffness"), "positive"),
+    **dict.fromkeys(("offset", "drift"), "finite"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -336,6 +339,4 @@ class Accelerometer(Sensor):
 
     def _responded(self, values: Float, rate: float) -> Float:
         seen = super()._responded(values, rate)
-        if self.high_pass > 0:
-            seen = seen - filtered(seen, rate, *low_pass(1, self.high_pass))
-        return seen + self.mean
+        return seen - filtered(seen, rate, *low_pass(1, self.high_pass)) + self.mean

@@ -85,12 +85,12 @@ class Recorder:
     @typed
     def step(self, channel: str, kind: str) -> tuple[float, float, float] | None:
         """Lowest value, highest value and step of the converter for a channel, in SI."""
-        if channel not in self.ranges or not self.bits:
+        if channel not in self.ranges:
             return None
         low, high = (to_si(v, kind, f"Recorder.ranges['{channel}']") for v in self.ranges[channel])
         advice = "give the lowest value first"
         require(low < high, f"Recorder.ranges['{channel}']", "rise", f"{low:g} to {high:g}", advice)
-        return low, high, (high - low) / (2**self.bits - 1)
+        return low, high, (high - low) / (2**self.bits - 1) if self.bits else 0.0
 
 
 @typed
@@ -200,7 +200,9 @@ class Tribometer:
         converter = recorder.step(name, sensor.reads)
         if converter is not None:
             low, high, step = converter
-            sampled = low + step * np.rint((np.clip(sampled, low, high) - low) / step)
+            sampled = np.clip(sampled, low, high)
+            if step:
+                sampled = low + step * np.rint((sampled - low) / step)
         unit = KINDS[sensor.reads].si
         return Channel(sampled, sensor.reads, unit, name, unit)
 
@@ -230,7 +232,7 @@ def channel_gain(tribometer: Tribometer, channel: str, frequency: ArrayLike) -> 
     gain = _filter(s, *low_pass(1, sensor.bandwidth)) * np.exp(-s * sensor.delay)
     if sensor.resonance > 0:
         gain = gain * _filter(s, *resonant(sensor.resonance, sensor.damping))
-    if isinstance(sensor, Accelerometer) and sensor.high_pass > 0:
+    if isinstance(sensor, Accelerometer):
         gain = gain * (1 - _filter(s, *low_pass(1, sensor.high_pass)))
     if recorder.cut_off is not None:
         gain = gain * _filter(s, *low_pass(recorder.order, recorder.cut_off))
