@@ -119,6 +119,7 @@ def test_a_recorded_load_and_velocity_are_followed(tmp_path) -> None:
     ("header", "cell", "message"),
     [
         ("time (s),load", "7", "write the unit into its heading"),
+        ("time,load (N)", "7", "state the unit of its time, got none of .time. in .rec.csv"),
         ("time (s),load (N)", "nan", "got none in row 1"),
         ("time (s),load (N)", "7\n5.0,8", "without 'backward time'"),
         ("time (s),x (mm)", "7", r"step 1\.file must name a channel, .*save it as CSV"),

@@ -97,6 +97,11 @@ def follow(channels: str, file: Path) -> Follow:
         rule = f"take a recording without '{finding.name}'"
         got = f"'{file.name}': {finding.sentence} Cut it to a part without this defect"
         require(finding.name not in _UNUSABLE, "file", rule, got)
+    # `read` takes a time without a unit for seconds, with a warning that a protocol does not show.
+    assumed = [f.where for f in trace.findings if f.name == "unknown unit"]
+    assumed = [name for name in assumed if name not in trace.channels]
+    rule, got = "state the unit of its time", f"none of '{', '.join(assumed)}' in '{file.name}'"
+    require(not assumed, "file", rule, got, "write it into the heading, as in 'time (s)'")
     values: dict[str, np.ndarray] = {}
     for name, channel in followed.items():
         rule = f"take the {name} from a channel of its unit"
