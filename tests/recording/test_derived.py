@@ -75,6 +75,15 @@ def test_a_channel_with_the_name_of_a_unit_is_the_channel():
     assert np.allclose(values(derive(trace, {"force": "2 N/V*G"}), "force"), 2 * volts)
 
 
+def test_a_role_with_the_name_of_a_unit_is_its_channel():
+    """2 m*F is no constant of two metres times a farad, where there is a shear force."""
+    trace = Trace(TIME, {"Shear": Channel(TIME, "force", "N", "Shear", "N")})
+    for text in ("2 m*F", "2 m * F", "2 m*Shear"):
+        assert np.array_equal(values(derive(trace, {"work": text}), "work"), 2 * TIME)
+    with pytest.raises(InputError, match="name a channel, got no column named like a friction"):
+        derive(trace, {"x": "2 kg*mu"})
+
+
 def test_an_expression_may_be_a_long_sum(rig):
     derived = derive(rig, {"new": "+".join(["slip"] * 390)})
     assert np.allclose(values(derived, "new"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)

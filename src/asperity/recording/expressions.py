@@ -168,9 +168,9 @@ class _Expression:
         number, text = float(token["number"]), token["unit"]
         if text is None:
             return self._unit(token["behind"] or "", number), token.end()
-        # "2 N/V*G" is 2 N/V times the channel G, also where G is the name of a unit.
-        names = {*self.trace.channels, *(c.recorded_name for c in self.trace.channels.values())}
-        factors = (m.start() for m in re.finditer(r"[*·]([^*/·]+)", text) if m[1] in names)
+        # "2 N/V*G" is 2 N/V times the channel or role G, also where G is the name of a unit.
+        parts = re.finditer(r"[*·]([^*/·]+)", text)
+        factors = (m.start() for m in parts if self._is_of_recording(m[1]))
         # "2 N/area" is 2 N divided by a channel: the longest valid unit belongs to the number.
         length = next(factors, len(text))
         while length > 0:
@@ -179,6 +179,13 @@ class _Expression:
             except InputError:
                 length = max(text.rfind(mark, 0, length) for mark in "*/·")
         return self._unit(text), token.end()
+
+    def _is_of_recording(self, name: str) -> bool:
+        """Whether a name is that of a channel or of a role, also of one that is not there."""
+        try:
+            return _key_of(self.trace, name) is not None
+        except InputError:
+            return True
 
     def _unit(self, text: str, number: float = 1.0) -> Quantity:
         try:
