@@ -416,3 +416,10 @@ def test_a_hold_that_the_user_leaves_out_is_named() -> None:
         (cut,) = (check for check in measurement.checks if check.name == "segments")
         assert ("the displacement stands still from 90 to 130 s" in cut.sentence) == named
         assert (cut.verdict == "suspicious") == named
+    # Sliding that is given as a hold has no healing.
+    for given in (
+        {"holds": [(40, 50), (90, 130), (150, 180)]},
+        {"steps": [40, 50, 90, 130, 150, 180], "velocities": [1e-5, 0, 1e-5, 0, 1e-5, 0, 1e-5]},
+    ):
+        (cut,) = (c for c in measure_sliding(trace, **given).checks if c.name == "segments")
+        assert "the displacement moves at 1e-05 m/s in the hold from 150 s to 180 s" in cut.sentence

@@ -21,7 +21,13 @@ from asperity.measurement.series import (
     steady_from,
 )
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
-from asperity.measurement.sliding.segments import Partition, partition, partition_at, require_cuts
+from asperity.measurement.sliding.segments import (
+    Partition,
+    partition,
+    partition_at,
+    require_cuts,
+    with_holds,
+)
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
@@ -179,7 +185,7 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
         if holds is not None:
             starts = {start for start, _ in holds}
             edges = [float(time[0]), *(c.time for c in cut.cuts)]
-            cut = replace(cut, holds=tuple(edge in starts for edge in edges))
+            cut = with_holds(cut, [edge in starts for edge in edges], cut.velocities)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
     # Spikes are named by a check; a peak of friction where the drive changes is none.
     wrong = away_from_changes(friction, spikes(friction), bounds[1:-1])

@@ -12,7 +12,7 @@ A cut lies where the lines on its two sides intersect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -61,6 +61,9 @@ _JUMP = 10.0
 _HOLD = 5e-3
 #: The displacement contradicts a velocity of the user that differs from it by more than this share.
 _OTHER_VELOCITY = 0.05
+#: It contradicts a hold of the user in which it has at least this share of the velocity next to it.
+#: A slider creeps in a short hold, but slower.
+_MOVES = 0.5
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,31 @@ def partition_at(
     if velocities is None:
         return Partition(cuts, speeds, holds, rates=tuple(rates))
     doubts = tuple(_contradicted(velocities, speeds))
-    return Partition(cuts, tuple(velocities), tuple(v == 0 for v in velocities), doubts)
+    given = Partition(cuts, tuple(velocities), (False,) * len(speeds), doubts)
+    return with_holds(given, tuple(v == 0 for v in velocities), speeds)
+
+
+def with_holds(cut: Partition, holds: Sequence[bool], speeds: Sequence[float]) -> Partition:
+    """The partition with the holds of the user, and doubts on those that the displacement moves in.
+
+    Parameters
+    ----------
+    cut : Partition
+    holds : sequence of bool
+        Whether each segment is a hold.
+    speeds : sequence of float
+        Measured velocities of the displacement (m/s); NaN where unknown.
+    """
+    doubts = list(cut.doubts)
+    for k, (hold, speed) in enumerate(zip(holds, speeds, strict=True)):
+        others = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
+        if hold and others and abs(speed) >= _MOVES * min(others) > 0:
+            ends = " to ".join(f"{c.time:.6g} s" for c in cut.cuts[max(k - 1, 0) : k + 1])
+            doubts.append(
+                f"the displacement moves at {abs(speed):.4g} m/s in the hold from {ends}: it slides "
+                "there, or the times are not those of the hold"
+            )
+    return replace(cut, holds=tuple(holds), doubts=tuple(doubts))
 
 
 def _contradicted(given: Sequence[float], measured: Sequence[float]) -> list[str]:
