@@ -132,7 +132,7 @@ def elastic_length(
     ------
     InputError
         If there are fewer than two pairs of loading and unloading, one of force and load is a
-        stress, or `spring` is given and both are.
+        stress, or `spring` is given and both are, or the displacement is no length.
 
     Notes
     -----
@@ -146,6 +146,9 @@ def elastic_length(
         require_one_dimension(normal, shear, load, force)
     except InputError as error:
         raise error.about("elastic_length.force") from None
+    rule, got = "be a length", f"'{displacement}' in '{moved.recorded_unit}'"
+    advice = f"name its unit when reading, like {Argument('units', displacement, 'um')}"
+    require(moved.kind == "length", "elastic_length.displacement", rule, got, advice)
     F, x, W = shear.values, moved.values, normal.values
     K = None if spring is None else to_si(spring, "stiffness", "elastic_length.spring")
     rule, area = "go with a force", Argument("read.area", value="25 cm^2")
