@@ -701,6 +701,11 @@ WITHOUT_INFLUENCE = [
     (("air", *LAYER, "--set", "R=1 cm"), "--set R must be left out with --for radius"),
     (("sweep", "p.toml", "--dry-run", "--extend"), "--extend must go without --dry-run"),
     (("sweep", "p.toml", "--dry-run", "--retry-failed"), "--retry-failed must go without"),
+    (("sweep", "p.toml", "--dry-run", "--scheduler", "a:1"), "--scheduler must go without --dry"),
+    (
+        ("sweep", "p.toml", "--dry-run", "--workers", "2", "--cluster", "2"),
+        "--workers and --cluster must be given alone, got both",
+    ),
     (("serve", "--law", "rice"), "law must be a registered law, got 'rice'"),
 ]
 

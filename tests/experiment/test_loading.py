@@ -133,5 +133,7 @@ def test_stresses_have_a_length_but_not_with_a_spring() -> None:
 def test_a_displacement_in_an_unknown_unit_is_no_length() -> None:
     planted = _planted(("force", "force"))
     volts = {**planted.channels, "displacement": Channel(planted.channels["displacement"].values)}
-    with pytest.raises(InputError, match="elastic_length.displacement must be a length, got 'disp"):
+    with pytest.raises(
+        InputError, match=r"elastic_length\.displacement must be a length, got 'disp"
+    ):
         elastic_length(Trace(planted.time, volts))

@@ -103,11 +103,18 @@ def run(
 ) -> int:
     """Run a plan; "asperity sweep PLAN" is the same."""
     if dry_run:
-        for name in ("extend_store", "retry_failed"):
-            written = f"--{name.removesuffix('_store').replace('_', '-')}"
-            rule, advice = "go without --dry-run", "a dry run is that of the whole plan"
+        rule, advice = (
+            "go without --dry-run",
+            "a dry run is that of the whole plan, on this machine",
+        )
+        for written, name in (
+            ("--extend", "extend_store"), ("--retry-failed", "retry_failed"),
+            ("--scheduler", "address"),
+        ):  # fmt: skip
             require(not options[name], written, rule, "both", advice)
         workers, cluster = options["workers"], options["cluster"]
+        one = workers is None or cluster is None
+        require(one, "--workers and --cluster", "be given alone", "both", "leave one out")
         return _estimate(plan, cluster if workers is None else workers, output)
     if out is None:
         raise InputError("--out", "be given", "nothing", "name the store, like --out results.zarr")

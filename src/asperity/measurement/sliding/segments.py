@@ -227,8 +227,8 @@ def with_holds(cut: Partition, holds: Sequence[bool], speeds: Sequence[float]) -
         if hold and others and abs(speed) >= _MOVES * min(others) > 0:
             ends = " to ".join(f"{c.time:.6g} s" for c in cut.cuts[max(k - 1, 0) : k + 1])
             doubts.append(
-                f"the displacement moves at {abs(speed):.4g} m/s in the hold from {ends}: it slides "
-                "there, or the times are not those of the hold"
+                f"the displacement moves at {abs(speed):.4g} m/s in the hold from {ends}: it "
+                "slides there, or the times are not those of the hold"
             )
     return replace(cut, holds=tuple(holds), doubts=tuple(doubts))
 
