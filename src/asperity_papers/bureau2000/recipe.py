@@ -109,6 +109,10 @@ _PUBLISHED = {
 }
 
 
+#: Numbers that the user may fix; the others are those that the procedure finds.
+_FIXED = ("K", "W0", "V0", "V", "epsilon", "frequency")
+
+
 def paper_procedure(
     readings: LockInTable,
     thresholds: Thresholds,
@@ -139,8 +143,13 @@ def paper_procedure(
     Raises
     ------
     InputError
-        If rows for step 1 are missing, or friction does not weaken with velocity.
+        If rows for step 1 are missing, friction does not weaken with velocity, or `fixed` has
+        another number.
     """
+    for name in fixed or {}:
+        if name not in _FIXED:
+            rule, advice = f"name one of {', '.join(_FIXED)}", "leave it out: the steps find it"
+            raise InputError("fixed", rule, f"'{name}'", advice)
     report = progress or (lambda done, total, label: None)
     steady, drop, first = _rows(readings)
     rows = [f"row {i + 1} of {thresholds.name}" for i in range(thresholds.V.size)]

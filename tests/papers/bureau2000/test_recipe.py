@@ -22,6 +22,11 @@ def procedure(columns, bifurcations, name="bifurcations", **fixed):
     return paper_procedure(table_of(columns), thresholds, fixed=MACHINE | fixed)
 
 
+def test_a_number_that_the_procedure_finds_is_not_fixed():
+    with pytest.raises(InputError, match=r"fixed must name one of K, W0, V0, .*, got 'A'"):
+        paper_procedure(None, None, fixed={"A": 0.02})
+
+
 @pytest.fixture(scope="module")
 def exact():
     """Columns of a table without noise, and the exact bifurcations (Eqs. 18 and 19)."""
