@@ -239,7 +239,7 @@ def measure(
     alone = not amplitudes or not (events or listed)
     rule = "go without --events, --steps and --holds"
     require(alone, "--amplitudes", rule, "both", one)
-    alone, advice = not amplitudes or out or not (given or conditions), "leave them out"
+    alone, advice = not amplitudes or bool(out) or not (given or conditions), "leave them out"
     rule = "go without --set and --conditions, or with --out"
     require(alone, "--amplitudes", rule, "numbers of the machine", advice)
     rows_of = _file_rows(recordings, source, question, conditions)

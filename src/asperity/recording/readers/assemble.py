@@ -195,7 +195,8 @@ def _by_name(
     units: Mapping[str, str], headings: Mapping[str, str], roles: Mapping[str, str]
 ) -> dict[str, str]:
     """Units by the name of the column; the user may have used its heading or role."""
-    by_name, kinds = {}, dict.fromkeys(headings)
+    by_name: dict[str, str] = {}
+    kinds = dict.fromkeys(headings)
     for key, text in units.items():
         try:
             name = key if key in headings else find_channel(key, kinds, roles, headings)
