@@ -104,7 +104,7 @@ def test_files_with_the_drive_bring_their_velocities(tmp_path):
         read_data(question.model_copy(update={"gauge": "50 Hz"}))
     with pytest.raises(InputError, match="runs must go with recorded runs"):
         fit(slow, "rice-ruina", runs=RunOptions(gauge=(1, 50.0)), fixed=MACHINE)
-    with pytest.raises(InputError, match="data must have different names, got slow, slow"):
+    with pytest.raises(InputError, match="recordings must have different names, got slow, slow"):
         fit([slow, replace(fast, name="slow")], "rice-ruina", fixed=MACHINE)
 
 
@@ -174,9 +174,6 @@ def test_what_is_irregular_is_said_and_what_is_not_there_is_asked_for():
         averaged_cycle(measured(3, velocity=None))
     with pytest.raises(InputError, match="must be regular stick-slip"):
         averaged_cycle(measured(3, spread=0.4))
-    twice = [averaged_cycle(measured(3))] * 2
-    with pytest.raises(InputError, match="different names, got recording, recording; give names"):
-        fit(twice, "rice-ruina", ["K"], fixed={**LAW, "M": MACHINE["M"]})
     coarse = averaged_cycle(measured(3, rate=20.0))
     assert not coarse.resolved
     with pytest.raises(InputError, match="M must be fixed where a slip is shorter"):

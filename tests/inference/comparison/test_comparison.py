@@ -253,7 +253,9 @@ def test_second_opinions_stand_beside_the_verdict(made, pmma):
     table = made("rice-ruina", 9)
     done = []
     count = {"progress": lambda *steps: done.append(steps)}
-    comparison = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, starts=4, **count)
+    comparison = compare(
+        table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, starts=4, **count
+    )
     assert done == sorted(done)
     assert done[-1] == (400, 400)
     assert "The evidence " in comparison.verdict

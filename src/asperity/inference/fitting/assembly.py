@@ -134,9 +134,6 @@ def objective_of(
     others = options in (None, RunOptions()) or bool(recordings)
     require(others, "runs", "go with recorded runs", "options of runs alone", "leave it out")
     if cycles:
-        once, called = len({c.name for c in cycles}) == len(cycles), [c.name for c in cycles]
-        advice = "give names, or each file once"
-        require(once, "data", "have different names", ", ".join(called), advice)
         # A cycle needs a mass.
         require_counted(given.fixed, motion, ("M", "inertia"), "cycles of stick-slip")
         return _of_cycles(law, cycles, names, given)
