@@ -26,7 +26,7 @@ from asperity.measurement.series import (
 )
 
 #: Fewest samples at the end of a hold whose line gives the relaxation.
-_RESTED = 6
+_FEWEST_AT_END = 6
 #: Samples of the shortest peak that noise may hide.
 _HIDDEN = 5
 #: Friction between these shares of the rise on sliding again gives the stiffness.
@@ -124,8 +124,8 @@ def read_hold(
     velocity: float,
     *,
     degree: int,
-    unsure: float = 0.0,
-    recorded: float = 0.0,
+    end_uncertainty: float = 0.0,
+    resolution: float = 0.0,
 ) -> HoldReading:
     """Read one hold.
 
@@ -141,30 +141,32 @@ def read_hold(
         Velocity of the sliding after the hold (m/s).
     degree : int
         Degree of the trend before the hold: 0 or 1.
-    unsure : float
+    end_uncertainty : float
         Uncertainty of the end of the hold (s).
-    recorded : float
-        Step in which the recorder has the friction.
+    resolution : float
+        Step of the recorder in friction.
     """
 
     def rounding(values: Float) -> float:
-        return float(rounding_variance(recorded, float(np.std(values)))[0])
+        return float(rounding_variance(resolution, float(np.std(values)))[0])
 
     begin, hold, again, stop = bounds
     slid, mu = bin_means(time[begin:hold] - edges[0], friction[begin:hold])
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])
     doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0] + rounding(friction[begin:hold])))
-    quick = neighbour_scatter(friction[begin:hold])
+    scatter = neighbour_scatter(friction[begin:hold])
     # Noise slower than a bin is the same in all samples of the short ends of a hold and of a peak.
     left = mu - columns(slid, min(degree, 1)) @ fit.beta
-    slow = max(float(np.var(left)) - quick**2 * mu.size / (hold - begin), 0.0)
-    # The time of its end may be off by what the cut says.
-    ends = max(hold + 1, int(np.searchsorted(time, edges[1] - unsure)))
-    low, low_doubt, falls = _rested(time[hold:ends] - edges[1], friction[hold:ends], quick)
-    low_doubt = np.sqrt(low_doubt**2 + slow + rounding(friction[hold:ends][-_RESTED:]))
-    peak, peak_doubt, dof, at = _peak(time, friction, again, stop, level, quick)
-    peak_doubt = float(np.sqrt(peak_doubt**2 + slow + rounding(np.array([peak]))))
+    slow_variance = max(float(np.var(left)) - scatter**2 * mu.size / (hold - begin), 0.0)
+    # Samples that may belong to the reloading already are left out.
+    ends = max(hold + 1, int(np.searchsorted(time, edges[1] - end_uncertainty)))
+    low, low_doubt, falls = _end_of_hold(time[hold:ends] - edges[1], friction[hold:ends], scatter)
+    low_doubt = np.sqrt(
+        low_doubt**2 + slow_variance + rounding(friction[hold:ends][-_FEWEST_AT_END:])
+    )
+    peak, peak_doubt, dof, at = _peak(time, friction, again, stop, level, scatter)
+    peak_doubt = float(np.sqrt(peak_doubt**2 + slow_variance + rounding(np.array([peak]))))
     dof = effective_dof([(doubt, fit.dof), (peak_doubt, dof)])
     half = float(stdtrit(dof, 0.975))
     healing_doubt = float(np.hypot(doubt, peak_doubt))
@@ -190,20 +192,20 @@ def read_hold(
     )
 
 
-def _rested(since: Float, friction: Float, quick: float) -> tuple[float, float, float]:
+def _end_of_hold(since: Float, friction: Float, scatter: float) -> tuple[float, float, float]:
     """Friction at the end of a hold, its uncertainty by noise, and its rate (1/s).
 
     It falls with the logarithm of time: a line through the last part of the hold is extrapolated to
     its end. Its last sample may hold the beginning of the loading.
     """
-    if friction.size > _RESTED:
-        first = max(0, friction.size - 1 - max(_RESTED, friction.size // 20))
+    if friction.size > _FEWEST_AT_END:
+        first = max(0, friction.size - 1 - max(_FEWEST_AT_END, friction.size // 20))
         since, friction = since[first:-1], friction[first:-1]
     away = since - since.mean()
     power = float(away @ away)
     slope, lever = slope_of(since, friction), (since.mean() ** 2 / power if power else 0.0)
     end = float(friction.mean() - slope * since.mean())
-    return end, quick * float(np.sqrt(1 / friction.size + lever)), slope
+    return end, scatter * float(np.sqrt(1 / friction.size + lever)), slope
 
 
 def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
@@ -235,7 +237,7 @@ def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
 
 
 def _peak(
-    time: Float, friction: Float, again: int, stop: int, level: float, quick: float
+    time: Float, friction: Float, again: int, stop: int, level: float, scatter: float
 ) -> tuple[float, float, float, int]:
     """Top of the peak after a hold, its uncertainty with degrees of freedom, and its sample.
 
@@ -249,25 +251,25 @@ def _peak(
     values = values[: max(8, values.size // 2)]
     rise = float(values.max()) - float(values[0])
     wide = 1
-    seen = quick < 0.02 * rise
+    seen = scatter < 0.02 * rise
     while not seen and wide < values.size // 8:
-        seen = float(_smoothed(values, wide).max()) - level > 10 * quick / np.sqrt(wide)
+        seen = float(_smoothed(values, wide).max()) - level > 10 * scatter / np.sqrt(wide)
         wide = wide if seen else 2 * wide + 1
     smooth = _smoothed(values, wide)
     top = int(np.argmax(smooth))
     height = max(
-        float(smooth[top]) - max(level, float(values[0])), 3 * quick / np.sqrt(wide), 0.2 * rise
+        float(smooth[top]) - max(level, float(values[0])), 3 * scatter / np.sqrt(wide), 0.2 * rise
     )
     tops = []
     for share in _TOPS:
-        low = smooth <= float(smooth[top]) - max(share * height, 2 * quick / np.sqrt(wide))
+        low = smooth <= float(smooth[top]) - max(share * height, 2 * scatter / np.sqrt(wide))
         left = int(np.flatnonzero(low[:top]).max(initial=-1)) + 1
         right = top + int(np.argmax(np.append(low[top:], True)))
         if right - left >= _FEWEST:
-            tops.append(_top(time[again + left : again + right], values[left:right], quick))
+            tops.append(_top(time[again + left : again + right], values[left:right], scatter))
     if not tops:
         near = values[max(top - wide // 2, 0) : top + wide // 2 + 1]
-        return float(near.mean()), float(quick / np.sqrt(near.size)), np.inf, again + top
+        return float(near.mean()), float(scatter / np.sqrt(near.size)), np.inf, again + top
     heights, doubts, dofs, places = np.array(tops).T
     weight = 1 / np.maximum(doubts, 1e-150) ** 2
     weight /= weight.sum()
@@ -280,7 +282,7 @@ def _peak(
     return height, doubt, float(dofs.min()), min(max(at, again), again + values.size - 1)
 
 
-def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, float, float]:
+def _top(time: Float, friction: Float, scatter: float) -> tuple[float, float, float, float]:
     """Maximum of the polynomial through a top, its uncertainty with its dof, and its time."""
     middle, half = float(time[-1] + time[0]) / 2, float(time[-1] - time[0]) / 2
     at, means = (time - middle) / half, friction
@@ -291,7 +293,7 @@ def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, floa
     curves = columns(points, _DEGREE)
     k = int(np.argmax(curves @ fit.beta))
     # The few slow waves of a residual may be weak by chance; many samples show the white noise.
-    noise = max(fit.variance, quick**2 * at.size / friction.size)
+    noise = max(fit.variance, scatter**2 * at.size / friction.size)
     variance = noise * float(curves[k] @ fit.inverse @ curves[k])
     return (
         float(curves[k] @ fit.beta),

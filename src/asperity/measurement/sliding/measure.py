@@ -1,4 +1,4 @@
-"""Recordings without modulation: what steady sliding, velocity steps and holds say."""
+"""Measurement of a recording without modulation: steady friction, velocity steps, holds."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ from asperity.recording.trace import Trace
 _DEFAULTS = Question()
 #: Samples on each side that a step needs, and in a hold's surroundings.
 _FEWEST = 16
-#: A gap may hide a peak if it is longer than so many usual sampling intervals, and than this share
-#: of the time from the end of the hold to the peak.
+#: A gap may hide a peak if it is longer than this many usual sampling intervals, and than this
+#: share of the time from the end of the hold to the peak.
 _GAP, _GAP_SHARE = 4.0, 0.2
 #: Share of the sliding before a hold that is left out, as it may settle from the hold before it.
 _SETTLING = 0.3
@@ -187,17 +187,17 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
             edges = [float(time[0]), *(c.time for c in cut.cuts)]
             cut = with_holds(cut, [edge in starts for edge in edges], cut.velocities)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
-    # Spikes are named by a check; a peak of friction where the drive changes is none.
+    # A check reports the spikes. A peak of friction where the drive changes is no spike.
     wrong = away_from_changes(friction, spikes(friction), bounds[1:-1])
     friction = without(friction, wrong)
     signals = replace(signals, friction=friction)
-    recorded = recorder_step(friction)
+    resolution = recorder_step(friction)
     segments = tuple(
-        _segment(time[a:b], friction[a:b], v, hold, recorded)
+        _segment(time[a:b], friction[a:b], v, hold, resolution)
         for (a, b), v, hold in zip(pairwise(bounds), cut.velocities, cut.holds, strict=True)
     )
-    read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
-    read_holds, turns = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
+    read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], resolution)
+    read_holds, turns = _holds(signals, cut, bounds, segments, DRIFTS[detrend], resolution)
     doubts = [*cut.doubts, *unread, *turns, *_hidden_peaks(time, read_holds)]
     if times is not None and signals.displacement is not None:
         doubts += _other_holds(time, cut, partition(time, signals.displacement))
@@ -208,7 +208,7 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     checks += findings([*about, *signals.signs], len(trace), float(time[-1] - time[0]))
     borne, at = signals.load, signals.load_time
     return SlidingMeasurement(
-        friction=mean_level(time, friction, recorded),
+        friction=mean_level(time, friction, resolution),
         load=None if borne is None or at is None else mean_level(at, borne),
         load_unit=signals.load_unit,
         segments=segments,
@@ -227,7 +227,7 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
 
 
 def _segment(
-    time: Float, friction: Float, velocity: float, hold: bool, recorded: float
+    time: Float, friction: Float, velocity: float, hold: bool, resolution: float
 ) -> SlidingSegment:
     means = block_means(friction, 100)
     begin = steady_from(means, 1) * max(1, friction.size // 100)
@@ -239,7 +239,7 @@ def _segment(
         end=float(time[-1]),
         velocity=velocity,
         hold=hold,
-        steady=mean_level(late, values, recorded),
+        steady=mean_level(late, values, resolution),
         slope=slope,
         scatter=float(np.std(values - slope * (late - late.mean()))),
         highest=float(smooth.max()),
@@ -253,7 +253,7 @@ def _steps(
     bounds: list[int],
     segments: tuple[SlidingSegment, ...],
     degree: int,
-    recorded: float,
+    resolution: float,
 ) -> tuple[list[VelocityStep], list[str]]:
     """Steps between two sliding segments, and sentences on steps that cannot be read."""
     steps: list[VelocityStep] = []
@@ -279,7 +279,7 @@ def _steps(
             unread.append(f"the step at {change.time:.6g} s has too few samples on one side")
             continue
         step = read_step(
-            change.time, before, after, degree=degree, first_settling=earlier, recorded=recorded
+            change.time, before, after, degree=degree, first_settling=earlier, resolution=resolution
         )
         if step is None:
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
@@ -295,7 +295,7 @@ def _holds(
     bounds: list[int],
     segments: tuple[SlidingSegment, ...],
     degree: int,
-    recorded: float,
+    resolution: float,
 ) -> tuple[list[HoldReading], list[str]]:
     """Holds between two sliding segments, and sentences on holds that cannot be read."""
     holds: list[HoldReading] = []
@@ -325,8 +325,8 @@ def _holds(
                 (cut.cuts[k - 1].time, cut.cuts[k].time),
                 cut.velocities[k + 1],
                 degree=degree,
-                unsure=cut.cuts[k].doubt,
-                recorded=recorded,
+                end_uncertainty=cut.cuts[k].doubt,
+                resolution=resolution,
             )
         )
     return holds, unread

@@ -139,7 +139,7 @@ def read_step(
     *,
     degree: int,
     first_settling: float = 0.0,
-    recorded: float = 0.0,
+    resolution: float = 0.0,
 ) -> VelocityStep | None:
     """Read one step; None if too little of the sliding after it is free of the transient.
 
@@ -154,7 +154,7 @@ def read_step(
     first_settling : float
         Slip at the beginning of the segment before the step during which an earlier transient
         decays.
-    recorded : float
+    resolution : float
         Step of the recorder in friction.
     """
     velocities = [side[2].value for side in (before, after)]
@@ -191,7 +191,7 @@ def read_step(
     if not readings:
         return None
     steady = earlier.friction, later.friction[later.slip >= min(settling, shorter / 2)]
-    rounding = sum(rounding_variance(recorded, float(np.std(side)))[0] for side in steady)
+    rounding = sum(rounding_variance(resolution, float(np.std(side)))[0] for side in steady)
     return _result(time, before, after, readings, settling, known, degree, float(rounding) ** 0.5)
 
 
