@@ -92,7 +92,7 @@ def catalogue(measurement: StickSlipMeasurement) -> xr.Dataset:
 
 
 def write_catalogue(measurement: StickSlipMeasurement, path: Path) -> None:
-    """Write the catalogue as its ending says.
+    """Write the catalogue in the format that the ending of the path names.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
 
 
 def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
-    """Everything that a stick-slip recording says, as numbers, texts, lists and dicts in SI."""
+    """All results of a stick-slip recording as numbers, texts, lists and dicts in SI."""
     return {
         "mode": measurement.mode,
         "verdict": measurement.verdict,
@@ -216,7 +216,7 @@ def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
 
 
 def summary_rows(measurement: StickSlipMeasurement) -> list[tuple[str, str, str, str]]:
-    """Name, value, spread and meaning of what the events say, as texts."""
+    """Name, mean, spread and meaning of the columns of the events, as texts."""
     rows = []
     for name, meaning in (
         ("drop", "of F/W"),

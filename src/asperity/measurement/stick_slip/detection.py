@@ -197,7 +197,7 @@ def _at_all_widths(
 ) -> Falls:
     """Falls at all widths up to an eighth of a cycle.
 
-    The cycle becomes longer as false falls disappear, so that wider means are added in turns.
+    The cycle becomes longer as false falls disappear, so that each round adds wider means.
     """
     most, longest, (peak, trough) = noise.longest, -1, first
     force = averages.force
@@ -298,7 +298,7 @@ def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, I
     length = np.maximum(peak[1:] - trough[:-1], 1).astype(float)
     # Noise decides where peaks and troughs are: the slope is fitted to all samples between them.
     first, stop = trough[:-1], peak[1:] + 1
-    rate = Sums(force, first, (first + stop) // 2).line(first, stop)[1]
+    rate = LineSums(force, first, (first + stop) // 2).line(first, stop)[1]
     near = np.arange(rate.size)[:, None] + np.arange(-_NEAR, _NEAR + 1)
     inside = (near >= 0) & (near < rate.size)
     near = np.clip(near, 0, rate.size - 1)
@@ -311,8 +311,8 @@ def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, I
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]
 
 
-class Sums:
-    """Sums over samples from which a straight line through any run of them follows.
+class LineSums:
+    """Running sums from which the line of least squares through any run of samples follows.
 
     Times and forces of each event's cell are counted from its middle, so that squares of long
     recordings lose no digits.
@@ -339,5 +339,5 @@ class Sums:
         n = np.maximum(n, 1.0)
         power = np.maximum(tt - t * t / n, 1e-9)
         slope = (ty - t * y / n) / power
-        rest = yy - y * y / n - slope * (ty - t * y / n)
-        return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
+        squares = yy - y * y / n - slope * (ty - t * y / n)
+        return (y - slope * t) / n, slope, np.maximum(squares, 0.0), t / n

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.measurement.stick_slip.detection import Falls, Sums
+from asperity.measurement.stick_slip.detection import Falls, LineSums
 from asperity.recording.defects.autoregression import Autoregression, fitted
 from asperity.recording.defects.levels import recorder_step
 
@@ -138,7 +138,7 @@ def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     k, n = peak.size, force.size
     # Cells end in the middle of the sticks.
     edges = (np.append(0, trough) + np.append(peak, n)) // 2
-    sums = Sums(force, edges[:-1], peak)
+    sums = LineSums(force, edges[:-1], peak)
     drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
     # The tail of an exponential fall is as long again as the part between its quarters.
@@ -171,7 +171,7 @@ def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
 
 
 def _onset_and_end(
-    sums: Sums,
+    sums: LineSums,
     part: Index,
     peak: Index,
     trough: Index,
@@ -201,8 +201,7 @@ def _onset_and_end(
     for _ in range(_ZOOMS):
         on = span_on[0][:, None] + (span_on[1] - span_on[0])[:, None] * grid
         off = span_end[0][:, None] + (span_end[1] - span_end[0])[:, None] * grid
-        until = np.maximum(np.floor(on).astype(np.intp) + 1, first[:, None] + 2)
-        since = np.minimum(np.ceil(off).astype(np.intp), stop[:, None] - 2)
+        until, since = _line_ends(on, off, first[:, None], stop[:, None])
         left = sums.line(first[:, None], until)
         right = sums.line(since, stop[:, None])
         high = left[0] + left[1] * (on - at)
@@ -235,6 +234,12 @@ def _onset_and_end(
             span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
     squares = misfit[rows, i, j]
     return onset, end, np.where(np.isfinite(squares), squares, 0.0)
+
+
+def _line_ends(onset: Float, end: Float, first: Index, stop: Index) -> tuple[Index, Index]:
+    """The sample after the line up to the onset, and the first of the line after the end."""
+    until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
+    return until, np.minimum(np.ceil(end).astype(np.intp), stop - 2)
 
 
 def _free_slip(u: Float, loaded: Float) -> Float:
@@ -289,7 +294,7 @@ class _Timing:
 
 
 def _timing(
-    sums: Sums,
+    sums: LineSums,
     part: Index,
     bounds: Bounds,
     rate: Float,
@@ -311,13 +316,12 @@ def _timing(
     places onset and end.
     """
     # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
-    from scipy.optimize import nnls
     from scipy.signal import lfilter
 
     first, stop = bounds[2:]
     k = part.size
 
-    def read(sums: Sums, part: Index, bounds: Bounds, rate: Float) -> list[tuple[Float, ...]]:
+    def read(sums: LineSums, part: Index, bounds: Bounds, rate: Float) -> list[tuple[Float, ...]]:
         return [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
 
     def contrasts(fits: list[tuple[Float, ...]], drop: Float) -> Float:
@@ -343,7 +347,9 @@ def _timing(
         settling = 10 * taps.size
         white = rng.standard_normal(settling + place.size)
         made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
-        again = read(Sums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many])
+        again = read(
+            LineSums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many]
+        )
         values = contrasts(again, drop[many])
         covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
         means.append(values.mean(1))
@@ -368,33 +374,54 @@ def _timing(
     weight = np.exp((min(distance) - np.array(distance)) / (2 * excess))
     weight /= weight.sum()
     moved = np.array(shifts)[:, :, best]
-    # Distances between the shapes, in standard deviations of the noise.
-    power, axes = np.linalg.eigh(covariances[best])
-    known = power > 1e-12 * power[-1]
     variance = weight @ moved**2
-    if known.any():  # Falls from one sample to the next have the same residuals in every shape.
-        away = np.array([*means, seen]) - means[best]
-        away = away @ axes[:, known] / np.sqrt(power[known])
-        # The shares of a mixture add up to one: a row of large weight.
-        unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
-        columns = np.hstack([away, unit])
-        mixture, left = nnls(columns[:-1].T, columns[-1])
-        # A part that neither a mixture nor noise explains is due to an unknown shape. It is assumed
-        # to move onset or end, per distance, no more than the worst of the known shapes.
-        far = (away[:-1] ** 2).sum(1)
-        others = np.arange(len(_SHAPES)) != best
-        lever = (moved[others] ** 2 / far[others, None]).max(0)
-        beyond = max(left**2 - known.sum(), 0.0) * lever
-        variance = variance + (mixture @ moved) ** 2 + beyond
-    return _Timing(
-        _SHAPES[best],
-        float(factors[best][best]),
-        float(np.sqrt(variance.max())),
-    )
+    variance = _with_mixtures(variance, means, seen, covariances[best], moved, best)
+    return _Timing(_SHAPES[best], float(factors[best][best]), float(np.sqrt(variance.max())))
+
+
+def _with_mixtures(
+    variance: Float, means: list[Float], seen: Float, covariance: Float, moved: Float, best: int
+) -> Float:
+    """Variances of onset and end, with the shifts by a shape between those of `_SHAPES`.
+
+    Parameters
+    ----------
+    variance : array, (2,)
+        Variances by the choice among `_SHAPES`.
+    means : list of array, (shapes - 1,)
+        Differences of sums of squares of the recordings simulated with each shape.
+    seen : array, (shapes - 1,)
+        Those of the recording.
+    covariance : array, (shapes - 1, shapes - 1)
+        Noise of these differences.
+    moved : array, (shapes, 2)
+        Shifts of onset and end of slips of each shape under the shape `best`, over the duration.
+    best : int
+    """
+    from scipy.optimize import nnls
+
+    # Distances between the shapes, in standard deviations of the noise.
+    power, axes = np.linalg.eigh(covariance)
+    known = power > 1e-12 * power[-1]
+    if not known.any():  # Falls from one sample to the next have the same residuals in every shape.
+        return variance
+    away = np.array([*means, seen]) - means[best]
+    away = away @ axes[:, known] / np.sqrt(power[known])
+    # The shares of a mixture add up to one: a row of large weight.
+    unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
+    columns = np.hstack([away, unit])
+    mixture, left = nnls(columns[:-1].T, columns[-1])
+    # A part that neither a mixture nor noise explains is due to an unknown shape. It is assumed
+    # to move onset or end, per distance, no more than the worst of the known shapes.
+    far = (away[:-1] ** 2).sum(1)
+    others = np.arange(len(_SHAPES)) != best
+    lever = (moved[others] ** 2 / far[others, None]).max(0)
+    beyond = max(left**2 - known.sum(), 0.0) * lever
+    return np.asarray(variance + (mixture @ moved) ** 2 + beyond)
 
 
 def _fitted_force(
-    sums: Sums,
+    sums: LineSums,
     part: Index,
     shape: Shape,
     slips: tuple[Float, Float],
@@ -405,8 +432,7 @@ def _fitted_force(
 ) -> Float:
     """Fitted force, line, slip and line, at the samples `place` of the events `owner`."""
     (onset, end), (first, stop) = slips, bounds
-    until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
-    since = np.minimum(np.ceil(end).astype(np.intp), stop - 2)
+    until, since = _line_ends(onset, end, first, stop)
     left, right = sums.line(first, until), sums.line(since, stop)
     origin = sums.origin[part]
     high = left[0] + left[1] * (onset - origin)
@@ -423,7 +449,7 @@ def _events_from_fits(
     time: Float,
     force: Float,
     scatter: Float,
-    sums: Sums,
+    sums: LineSums,
     slips: tuple[Float, Float],
     bounds: tuple[Index, Index],
     sticks: _Sticks,
@@ -433,8 +459,7 @@ def _events_from_fits(
     """Events with uncertainties; slow noise multiplies the uncertainties of forces by `slow`."""
     (onset, end), (first, stop) = slips, bounds
     step = float(time[-1] - time[0]) / (force.size - 1)
-    until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
-    since = np.clip(np.ceil(end).astype(np.intp), None, stop - 2)
+    until, since = _line_ends(onset, end, first, stop)
 
     def level(begin: Index, close: Index, at: Float) -> tuple[Float, Float]:
         mean, slope, *_ = sums.line(begin, close)
@@ -515,7 +540,7 @@ def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
     if not first.size:
         return _Sticks(*(np.empty(0),) * 6)
     middle = (first + stop) // 2
-    sums = Sums(force, first, middle)
+    sums = LineSums(force, first, middle)
     level, slope, _, away = sums.line(first, stop)
     count = (stop - first).astype(float)
     mean_error = _scatter_of_mean(scatter, count)
@@ -533,7 +558,7 @@ def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
 
 
 def _slow_noise_factor(
-    sums: Sums,
+    sums: LineSums,
     edges: Index,
     slips: tuple[Float, Float],
     bounds: tuple[Index, Index],
