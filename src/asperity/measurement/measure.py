@@ -244,12 +244,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     steps = step_of(load), step_of(force)
     reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if window is None else "user"
-    before, after = _around(samples, parts, chosen, reading.W0, steps)
-    if after and before and before.rate and after.rate:
-        # If a pause drifts while the pause before the modulation does not, it still recovers.
-        change = after.rate.beyond(before.rate) * (after.force.end - after.force.start)
-        if change > LOCK_IN["transient"][0] * abs(after.force.value):
-            after = None
+    before, after = _steady_pauses(*_around(samples, parts, chosen, reading.W0, steps))
     pauses = [before.rate] if before and before.rate else []
     if before and after:
         pauses.append(rate_between(before.force, after.force))
@@ -330,6 +325,18 @@ class _Pause(NamedTuple):
     rounding: float
     #: Rate at which the force changes; None of a short pause.
     rate: Rate | None
+
+
+def _steady_pauses(
+    before: _Pause | None, after: _Pause | None
+) -> tuple[_Pause | None, _Pause | None]:
+    """The two pauses; the second is left out while it recovers from the modulation."""
+    if after and before and before.rate and after.rate:
+        # It drifts, and the pause before the modulation does not.
+        change = after.rate.beyond(before.rate) * (after.force.end - after.force.start)
+        if change > LOCK_IN["transient"][0] * abs(after.force.value):
+            return before, None
+    return before, after
 
 
 def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None]) -> list[Check]:

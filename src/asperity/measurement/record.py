@@ -27,7 +27,7 @@ SLIDING_CONVENTIONS = (
 
 
 def modulated_record(measurement: Measurement) -> dict[str, Any]:
-    """Everything that a reading says.
+    """All results of a lock-in reading.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], Fl
 
 
 def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
-    """Everything that a recording without modulation says.
+    """All results of a recording without modulation.
 
     Parameters
     ----------

@@ -291,7 +291,7 @@ def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tupl
     """A number rounded to two digits of its uncertainty."""
     from asperity.units import display_unit
 
-    # A recording of the tide lasts for days, a stress is one of MPa.
+    # In a unit with a prefix, such as MPa, or in days.
     unit, power = display_unit(value, unit)
     number, uncertain = rounded(value * 10.0**-power, doubt * 10.0**-power)
     return name, f"{number} {unit}".strip(), uncertain, meaning

@@ -332,7 +332,7 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
 
 
 def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float, seen: set[bytes]) -> _Level:
-    """Harmonics that are cut off: harmonics fitted inside the levels, then levels, in turns.
+    """Harmonics that are cut off: harmonics between the levels and the levels fitted alternately.
 
     The phases beyond the levels determine all later rounds: phases that were `seen` from another
     start lead to the same end, and are not computed again.
