@@ -51,6 +51,10 @@ class Damped(Motion):
         """F/W0."""
         return Y[0]
 
+    def _net_force(self, friction: Array, v: Array, Y: Array, at: Excitation) -> Array:
+        """Force that accelerates the slider, over W0, at F_i/W and v/V."""
+        return Y[0] + at.shear - at.w * friction - self.damping * v
+
     def mechanical_states(
         self, friction: Array, velocity: ArrayLike, log_slip: ArrayLike, at: Excitation
     ) -> tuple[ArrayLike, ...]:
@@ -105,7 +109,7 @@ class Inertial(_OnAsperities):
         return Y[1]
 
     def _acceleration(self, Y: Array, at: Excitation) -> list[Array]:
-        return [self.mobility * (Y[0] + at.shear - at.w * Y[2] - self.damping * Y[1])]
+        return [self.mobility * self._net_force(Y[2], Y[1], Y, at)]
 
 
 class RadiatingAsperities(_OnAsperities):
@@ -143,6 +147,6 @@ class StiffInertial(Damped):
         """dY/dtheta."""
         v = jnp.exp(Y[1])
         friction = self.slider.law.friction(self.V * v, self.law_state(Y), at.w)
-        excess = Y[0] + at.shear - at.w * friction - self.damping * v
-        rates = [self.kappa * (at.pull - v), self.mobility * excess * jnp.exp(-Y[1])]
+        net_force = self._net_force(friction, v, Y, at)
+        rates = [self.kappa * (at.pull - v), self.mobility * net_force * jnp.exp(-Y[1])]
         return jnp.stack(jnp.broadcast_arrays(*rates, *self._law_rates(v, v, Y, at)))

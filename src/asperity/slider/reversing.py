@@ -54,22 +54,20 @@ class ReversingInertial(Damped):
             (state, at.w),
             (tuple(r * jnp.ones_like(v) for r in state_rates), at.w_slope * jnp.ones_like(at.w)),
         )
-        excess = Y[0] + at.shear - at.w * friction - self.damping * v
-        change = (self.mobility * excess - drift) / self._steepness(friction, state, at.w)
+        slope = _velocity_slope(self.slider.law, friction, state, at.w) / self.V
+        change = (self.mobility * self._net_force(friction, v, Y, at) - drift) / slope
         rates = [self.kappa * (at.pull - v), change, *state_rates]
         return jnp.stack(jnp.broadcast_arrays(*rates))
 
     def inertness(self, Y: Array, at: Excitation) -> Array:
         """As in `Motion`; friction relaxes fast where the velocity depends on it weakly."""
-        one, steepness = jnp.ones_like(Y[0]), self._steepness(Y[1], self.law_state(Y), at.w)
-        return jnp.stack([one, steepness, *(one for _ in Y[2:])])
-
-    def _steepness(self, friction: Array, state: tuple[Array, ...], w: Array) -> Array:
-        """Derivative of v/V to F_i/W."""
-        return _steepness(self.slider.law, friction, state, w) / self.V
+        one = jnp.ones_like(Y[0])
+        slope = _velocity_slope(self.slider.law, Y[1], self.law_state(Y), at.w) / self.V
+        return jnp.stack([one, slope, *(one for _ in Y[2:])])
 
 
-def _steepness(law: Law, friction: Array, state: tuple[Array, ...], w: ArrayLike) -> Array:
+def _velocity_slope(law: Law, friction: Array, state: tuple[Array, ...], w: ArrayLike) -> Array:
+    """Derivative of the velocity of the law with respect to F_i/W."""
     one = jnp.ones_like(friction)
     return jax.jvp(lambda g: law.velocity(g, state, w), (friction,), (one,))[1]
 
@@ -82,7 +80,7 @@ def reversing(motion: Motion) -> Motion:
     if not (isinstance(motion, StiffInertial) and motion.signed):
         return motion
     law, V = motion.slider.law, motion.V
-    rest = _steepness(law, jnp.zeros(()), law.steady_state(V), jnp.ones(()))
+    rest = _velocity_slope(law, jnp.zeros(()), law.steady_state(V), jnp.ones(()))
     if not bool(jnp.all(rest > 0)):
         return motion
     return ReversingInertial(motion.slider, V, motion.omega, motion.eta)

@@ -138,8 +138,8 @@ class Programme:
             if inside.any():
                 x = np.maximum(times[inside] - self.starts[k], 0.0)
                 # Padded to a power of two: few programs for any number of times.
-                room = (0, (1 << int(x.size - 1).bit_length()) - x.size)
-                part = np.asarray(read(segment, np.pad(x, room, mode="edge")))[: x.size]
+                padding = (0, (1 << int(x.size - 1).bit_length()) - x.size)
+                part = np.asarray(read(segment, np.pad(x, padding, mode="edge")))[: x.size]
                 values[inside] = part if before is None else before[k] + part
         return values
 

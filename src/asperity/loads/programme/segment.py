@@ -95,6 +95,11 @@ load_of = jax.jit(lambda segment, t: segment.at(t, 1.0, 1.0).w)
 pull_of = jax.jit(lambda segment, t: segment.at(t, 1.0, 1.0).pull)
 
 
+def _smooth_rise(x: Any) -> Any:
+    """From 0 at x = 0 to 1 at x = 1, where first and second derivative vanish."""
+    return x**3 * (10 - 15 * x + 6 * x**2)
+
+
 class HarmonicSegment(ProgrammeSegment):
     """Load and velocity that rise or fall linearly, with a harmonic modulation on top.
 
@@ -150,7 +155,7 @@ class HarmonicSegment(ProgrammeSegment):
         slow = self.rise > 0
         x = jnp.where(slow, jnp.clip(t / jnp.where(slow, self.rise, 1.0), 0.0, 1.0), 1.0)
         change = self.epsilon2 - self.epsilon1
-        epsilon = self.epsilon1 + change * x**3 * (10 - 15 * x + 6 * x**2)
+        epsilon = self.epsilon1 + change * _smooth_rise(x)
         growth = 30 * (x * (1 - x)) ** 2 * change / jnp.where(slow, self.rise, 1.0)
         level = self.load1 + self.load_rate * t
         part = level * epsilon * cos
@@ -191,7 +196,7 @@ class HarmonicSegment(ProgrammeSegment):
             return 0.0
         low, high = 0.0, min(rise, duration) / rise
         while low < (x := 0.5 * (low + high)) < high:  # until doubles are exhausted
-            epsilon = begin + (end - begin) * x**3 * (10 - 15 * x + 6 * x**2)
+            epsilon = begin + (end - begin) * _smooth_rise(x)
             above = level * (1 - abs(epsilon)) > load
             low, high = (x, high) if above else (low, x)
         low *= rise
