@@ -23,7 +23,7 @@ from jax import Array
 #: Largest last change of a solution, relative to its size.
 _TOLERANCE = 1e-8
 #: Largest number of rounds of steps.
-_PASSES = 12
+_ROUNDS = 12
 
 
 def contracted(
@@ -59,21 +59,21 @@ def contracted(
             ]
         ).max(0)
 
-    def several(carry: tuple) -> tuple:
-        y, _, change, passes = carry
+    def take_round(carry: tuple) -> tuple:
+        y, _, change, rounds = carry
         last = jax.lax.fori_loop(0, steps, step, y)
         new = step(0, last)
         now = largest(jax.tree.map(jnp.subtract, new, last))
         good = now <= _TOLERANCE * largest(new)
-        return new, jnp.where(good, 0.0, jnp.where(now < change, now, jnp.inf)), now, passes + 1
+        return new, jnp.where(good, 0.0, jnp.where(now < change, now, jnp.inf)), now, rounds + 1
 
     def unfinished(carry: tuple) -> Array:
-        _, left, _, passes = carry
-        return (passes < _PASSES) & jnp.any((left > 0) & (left < jnp.inf))
+        _, left, _, rounds = carry
+        return (rounds < _ROUNDS) & jnp.any((left > 0) & (left < jnp.inf))
 
     size = largest(right)
     start = (right, jnp.full_like(size, jnp.nan), size, 0)
-    new, left, _, _ = jax.lax.while_loop(unfinished, several, several(start))
+    new, left, _, _ = jax.lax.while_loop(unfinished, take_round, take_round(start))
 
     def kept(y: Array) -> Array:
         good = (left == 0).reshape(-1, *(1,) * (y.ndim - 1)) if points_first else left == 0

@@ -147,6 +147,8 @@ class _Step(NamedTuple):
 
 
 class _Run(NamedTuple):
+    """State of the loop over the steps."""
+
     next: _Step
     before: Array  # the two distances at the beginning of the next step
     crossed: tuple[_Step, _Step]  # the last steps in which they rose through zero
@@ -190,7 +192,7 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
             [End.CROSSING, End.RUNAWAY, End.TIME, End.STEADY, End.TOO_MANY_STEPS],
             -1,
         )
-        follow = _Step(
+        next_step = _Step(
             accepted(jnp.where(cut, drive.until, t + h), t),
             accepted(trial.end, Y),
             accepted(trial.memory, slope),
@@ -200,7 +202,7 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
             jax.tree.map(lambda a, b, r=r: jnp.where(r, a, b), this, step)
             for r, step in zip(rising, run.crossed, strict=True)
         )
-        return _Run(follow, accepted(now, run.before), crossed, end, run.steps + 1)
+        return _Run(next_step, accepted(now, run.before), crossed, end, run.steps + 1)
 
     zero = jnp.zeros(())
     first = _Step(

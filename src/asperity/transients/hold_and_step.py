@@ -19,7 +19,7 @@ from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_
 SETTLED = 0.05
 #: Sum of the distances from steady sliding, in logarithms, below which a motion ends that has not
 #: reached the velocity of the drive.
-_OVER = 1e-9
+_STEADY = 1e-9
 
 
 class SettlingDistance(NamedTuple):
@@ -88,14 +88,14 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     """
     steady = _steady(slider, V)
     holding = drive_many(slider, V, Drive(pull=0.0, until=hold_time), steady)
-    reloaded = drive_many(slider, V, Drive(up=1.0, steady=_OVER), holding.Y)
+    reloaded = drive_many(slider, V, Drive(up=1.0, steady=_STEADY), holding.Y)
     return _after_hold(slider, V, steady, holding, reloaded)
 
 
 @jit_large
 def _steady(slider: Slider, V: Array) -> Array:
     """States of steady sliding with no displacement yet, shape (points, size + 1)."""
-    return _from_here(QuasiStatic(slider, V, 1.0).steady())
+    return _undisplaced(QuasiStatic(slider, V, 1.0).steady())
 
 
 @jit_large
@@ -160,7 +160,7 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
     Shapes and the second result as of `hold`.
     """
     start = _steady(slider, V_before)
-    drive = Drive(up=jnp.where(V_before < V, 1.0, -1.0), steady=_OVER)
+    drive = Drive(up=jnp.where(V_before < V, 1.0, -1.0), steady=_STEADY)
     reached = drive_many(slider, V, drive, start)
     return _after_step(slider, V, start, reached), reached
 
@@ -173,7 +173,7 @@ def _after_step(slider: Slider, V: Array, start: Array, reached: Reached) -> Ste
     return StepResponse(
         _force(motion, start),
         jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
-        _force(motion, _from_here(motion.steady())),
+        _force(motion, _undisplaced(motion.steady())),
         jnp.where(lost, jnp.nan, reached.t * V),
         jnp.where(lost, jnp.nan, reached.Y[:, -1] * length_scale),
         reached.Y[:, :-1],
@@ -193,15 +193,15 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     runaway : array, shape (points,)
         ln(v_pl / V) at which a motion counts as a runaway.
     """
-    on = drive_many(slider, V, _to_steady(slider, V, extremum, runaway), extremum.Y)
-    return _settling(slider, V, extremum, on)
+    settled = drive_many(slider, V, _settling_drive(slider, V, extremum, runaway), extremum.Y)
+    return _settling(slider, V, extremum, settled)
 
 
 @jit_large
-def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Drive:
+def _settling_drive(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Drive:
     """The drive from an extremum on."""
     motion = QuasiStatic(slider, V, 1.0)
-    level = _force(motion, _from_here(motion.steady()))
+    level = _force(motion, _undisplaced(motion.steady()))
     width = SETTLED * jnp.abs(_force(motion, extremum.Y) - level)
     # Where all logarithms are this close to steady sliding the force stays within the width.
     close = jnp.minimum(1e-3, 0.05 * width)
@@ -209,18 +209,18 @@ def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> D
 
 
 @jit_large
-def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> SettlingDistance:
+def _settling(slider: Slider, V: Array, extremum: Reached, settled: Reached) -> SettlingDistance:
     crossing = extremum.end == End.CROSSING
-    over = crossing & (on.end == End.STEADY)
+    steady = crossing & (settled.end == End.STEADY)
     length_scale = slider.W0 / slider.K
     return SettlingDistance(
-        jnp.where(crossing, on.end, extremum.end),
-        jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
-        jnp.where(over, on.last_Y[:, -1] * length_scale, jnp.nan),
+        jnp.where(crossing, settled.end, extremum.end),
+        jnp.where(steady, (extremum.t + settled.last) * V, jnp.nan),
+        jnp.where(steady, settled.last_Y[:, -1] * length_scale, jnp.nan),
     )
 
 
-def _from_here(states: Array) -> Array:
+def _undisplaced(states: Array) -> Array:
     """States, shape (size, points), as Y, shape (points, size + 1), with no displacement yet."""
     return jnp.append(states, jnp.zeros((1, states.shape[1])), axis=0).T
 

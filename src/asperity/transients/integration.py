@@ -169,7 +169,7 @@ class MethodChoice:
         ----------
         chunk : StepChunk
         many : bool
-            Whether so many of these steps remain that the implicit method is tried in any case:
+            Whether many such steps remain: the implicit method is then tried in any case, because
             near a steady state the steps do not show the limit of stability.
         """
         # A chunk that ends early, at a break point, has too few steps to judge.
