@@ -23,7 +23,6 @@ from jax import Array
 
 from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import solve_columns, spectral_radius, value_and_jacobian
-from asperity.loads import Excitation
 from asperity.transients.dense_output import Interval, StepChunk
 from asperity.transients.equations import SegmentEquations, Tolerances
 from asperity.transients.step_size import TrialStep, one_kernel, run_steps
@@ -117,7 +116,7 @@ def _step(
     table = _tableau()
     n = Y.shape[0] - 1
     now, at = system.at(t), system.at(t + jnp.asarray(table.c) * h)
-    value, slopes = value_and_jacobian(lambda y: _stacked(system, now, y), Y[:n])
+    value, slopes = value_and_jacobian(lambda y: system.rates(now, jnp.append(y, 0.0)), Y[:n])
     jacobian = slopes[:n]
     values = jnp.asarray(table.eigenvalues)
     identity = jnp.eye(n)[:, :, None]
@@ -158,9 +157,3 @@ def _step(
 def _left(size: Array, rate: Array) -> Array:
     """Sum of the corrections still to come, if they fall geometrically."""
     return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)
-
-
-def _stacked(system: SegmentEquations, at: Excitation, states: Array) -> Array:
-    """Rates of the motion's states and of the displacement, shape (size + 1,)."""
-    rates, x_rate = system.motion_rates(at, states)
-    return jnp.concatenate([rates, jnp.reshape(x_rate, (1,))])
