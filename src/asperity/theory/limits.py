@@ -38,8 +38,9 @@ from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 
-#: Largest change of a logarithmic state in a step; the unknown is the mean of e^(-state).
-_STATE_STEP = 2.0
+#: Largest change of a logarithmic state in a step, the unknown being the mean of e^(-state); and
+#: largest number of steps.
+_STATE_STEP, _MOST_STEPS = 2.0, 12
 
 
 class SlipPulse(NamedTuple):
@@ -103,7 +104,6 @@ def averaged_limit(
     weights: Array,
     *,
     tolerance: float = 1e-12,
-    max_steps: int = 12,
 ) -> AveragedLimit:
     """States that make the mean rates vanish, by Newton's method from `laplace_estimate`.
 
@@ -117,8 +117,6 @@ def averaged_limit(
         Their share of the period; sums to 1.
     tolerance : float
         On the last change of the exponent of the slip rate and of the logarithmic states.
-    max_steps : int
-        Newton steps at most.
 
     Returns
     -------
@@ -137,7 +135,7 @@ def averaged_limit(
 
     def unfinished(carry: tuple) -> Array:
         *_, change, steps = carry
-        return (steps < max_steps) & jnp.any(change > tolerance)
+        return (steps < _MOST_STEPS) & jnp.any(change > tolerance)
 
     def newton(carry: tuple) -> tuple:
         """New means, the matrix used, the largest logarithmic change, and the number of steps."""

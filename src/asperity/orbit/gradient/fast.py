@@ -32,8 +32,8 @@ from asperity.orbit.methods.fourier import (
     jacobian_on,
     load_cycle,
     orbit_error,
+    per_tau,
     rates_on,
-    stretched,
     together,
 )
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
@@ -173,7 +173,7 @@ class FourierEquations(Equations):
     ) -> tuple[Matrix, np.ndarray]:
         """Derivatives of the rates per unit of tau, and the integrating matrix of the grid."""
         cycle = self.cycle(problem)
-        return stretched(cycle, self.jacobian(problem, unknowns)), cycle.integral
+        return per_tau(cycle, self.jacobian(problem, unknowns)), cycle.integral
 
     def jacobian(self, problem: Problem, unknowns: FourierUnknowns) -> Matrix:
         """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""

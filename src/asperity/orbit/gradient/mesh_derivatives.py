@@ -288,10 +288,10 @@ def _count(program: Program) -> int:
     return 1 + 2 * program.harmonics + 2 * program.states * program.multipliers
 
 
-def _called(
+def _searched_response(
     program: Program, parameters: Any, wanted: Array, *, derivatives: bool
 ) -> tuple[Array, Array, Array]:
-    """`_response` in another process, if any point is wanted."""
+    """`_response` as a compiled program calls it, if any point is wanted."""
     (points,), names = wanted.shape, program.equations.names
     count = _count(program)
     shapes = (
@@ -302,7 +302,10 @@ def _called(
 
     def call(parameters: Any, wanted: Any) -> Any:
         values = {n: np.asarray(v) for n, v in parameters.items()}
-        return _in_another_process(_response, program, values, np.asarray(wanted), derivatives)
+        # A program of XLA for the CPU that calls another program may deadlock: the search runs in a
+        # separate process, which starts at its first use.
+        submit = kept_processes(1).submit
+        return submit(_response, program, values, np.asarray(wanted), derivatives).result()
 
     def search(parameters: Any) -> Any:
         return jax.pure_callback(call, shapes, parameters, wanted, vmap_method="sequential")
@@ -312,15 +315,6 @@ def _called(
         return columns, outcome + int(Outcome.NO_ORBIT), table
 
     return jax.lax.cond(wanted.any(), search, nothing, parameters)
-
-
-def _in_another_process(function: Any, *arguments: Any) -> Any:
-    """The result of a function that a compiled program waits for.
-
-    A program of XLA for the CPU that calls another program may deadlock. The search therefore runs
-    in a separate process, which starts at its first use.
-    """
-    return kept_processes(1).submit(function, *arguments).result()
 
 
 def _response(
@@ -344,30 +338,30 @@ def _response(
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _columns(program: Program, parameters: Parameters, wanted: Array) -> tuple[Array, Array]:
     """Real columns (points, count) of the response, and the outcome."""
-    return _called(program, parameters, wanted, derivatives=False)[:2]
+    return _searched_response(program, parameters, wanted, derivatives=False)[:2]
 
 
 @_columns.defjvp
 def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     parameters, wanted = primals
     fixed = jax.lax.stop_gradient(parameters)
-    columns, outcome, table = _called(program, fixed, wanted, derivatives=True)
+    columns, outcome, table = _searched_response(program, fixed, wanted, derivatives=True)
     # Second derivatives are unknown for both.
     point = sum(parameters.values())
-    columns, table = _unknown(columns, point), _unknown(table, point)
+    columns, table = _without_derivatives(columns, point), _without_derivatives(table, point)
     names = program.equations.names
     change = sum(table[k] * tangents[0][n][:, None] for k, n in enumerate(names))
     return (columns, outcome), (change, np.zeros(outcome.shape, jax.dtypes.float0))
 
 
 @jax.custom_jvp
-def _unknown(values: Array, point: Array) -> Array:
+def _without_derivatives(values: Array, point: Array) -> Array:
     """`values` with NaN derivatives where the derivatives of `point`, (points,), are not zero."""
     return values
 
 
-@_unknown.defjvp
-def _unknown_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+@_without_derivatives.defjvp
+def _without_derivatives_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
     values, point = primals
-    lost = jnp.where(tangents[1] != 0, jnp.nan, 0.0)
-    return _unknown(values, point), lost[:, None] * jnp.ones_like(values)
+    change = jnp.where(tangents[1] != 0, jnp.nan, 0.0)
+    return _without_derivatives(values, point), change[:, None] * jnp.ones_like(values)

@@ -278,7 +278,7 @@ def fourier_orbit(problem: Problem, *, nodes: int, grading: float) -> FourierOrb
     return FourierOrbit(mean, zero_mean, error, steps, grading)
 
 
-def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:
+def per_tau(cycle: LoadCycle, J: Matrix) -> Matrix:
     """Derivatives of the rates per unit of tau, from those per radian."""
     return [[cycle.stretch[:, None] * entry for entry in row] for row in J]
 
@@ -303,7 +303,7 @@ def fourier_observables(
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
     J = jacobian_on(system, cycle, together(orbit.mean, orbit.zero_mean))
     trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
-    floquet = floquet_form(stretched(cycle, J), cycle.integral)
+    floquet = floquet_form(per_tau(cycle, J), cycle.integral)
     error = orbit_error(system, cycle, orbit, harmonics)
     zero = jnp.zeros_like(mean)
     observables = Observables(

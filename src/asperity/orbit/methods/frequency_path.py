@@ -39,7 +39,8 @@ class FrequencyPath(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; an orbit that is not resolved may not exist, and is not reported."""
         faster = _faster(problem)
-        origin = _at_frequency(problem, faster)
+        omega = problem.system.omega * faster
+        origin = eqx.tree_at(lambda q: q.system.omega, problem, omega)
         orbit, rows = orbits_from_averaged_limit(origin, np.arange(len(faster)))
         if not len(rows):
             return Solution.unsolved(problem, options)
@@ -59,8 +60,3 @@ def _faster(problem: Problem) -> Float:
     for part, value in run_chunks(_rate, (problem,), np.arange(len(rate)), chunk):
         rate[part] = value
     return np.maximum(rate / _FAST_MODULATION, 1.0)
-
-
-def _at_frequency(problem: Problem, factor: Float) -> Problem:
-    """The problem at a frequency that is higher by a factor."""
-    return eqx.tree_at(lambda q: q.system.omega, problem, problem.system.omega * factor)
