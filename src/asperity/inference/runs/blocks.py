@@ -24,7 +24,7 @@ from scipy.special import chdtrc
 from asperity.arrays import Float
 from asperity.errors import require
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
-from asperity.recording.defects.lines import find_lines, take_off
+from asperity.recording.defects.lines import find_lines, subtract_line
 from asperity.units import to_si
 
 #: Smallest and largest number of blocks of a recording.
@@ -259,6 +259,6 @@ def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
     taken: list[float] = []
     for (a, b), step in zip(run.stretches, _intervals(run), strict=True):
         for hertz in find_lines(friction[a:b], step, lowest):
-            take_off(friction[a:b], hertz * step)
+            subtract_line(friction[a:b], hertz * step)
             taken.append(hertz)
     return (replace(run, friction=friction) if taken else run), tuple(sorted(taken))

@@ -21,7 +21,7 @@ _SEARCHED_STEPS = 64
 #: Values that differ by less than this share of the range are equal: a signal without noise that is
 #: sampled at the same phases in each period repeats its values to within their last digits.
 _SAME = 1e-9
-#: So many equal samples in a row are no chance where the values next to them occur once.
+#: This many equal samples in a row are no chance where the values next to them occur once.
 _IN_A_ROW = 3
 #: Rounding is coarse where this share of neighbours is equal and the other differences are whole
 #: multiples of one step, to this share of it.
@@ -158,8 +158,8 @@ def _common_step(values: Float, same: float) -> float:
         # Euclid's algorithm.
         larger, smaller = float(other), step
         while smaller > same:
-            rest = larger % smaller
-            larger, smaller = smaller, min(rest, smaller - rest)
+            remainder = larger % smaller
+            larger, smaller = smaller, min(remainder, smaller - remainder)
         step = larger
     return step
 

@@ -56,7 +56,7 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     return result
 
 
-def take_off(x: Float, turns: float) -> None:
+def subtract_line(x: Float, turns: float) -> None:
     """Subtract a line of `turns` cycles a sample, in place, in pieces of 100 periods.
 
     Amplitude and phase are fitted to the signal minus its running mean over a period, because a
@@ -68,8 +68,8 @@ def take_off(x: Float, turns: float) -> None:
     wave = np.exp(2j * np.pi * turns * k)
     columns = np.stack([wave.real, wave.imag, u * wave.real, u * wave.imag], axis=1)
     inverse = np.linalg.pinv(columns)
-    quick = x - uniform_filter1d(x, round(1 / turns))
+    fast = x - uniform_filter1d(x, round(1 / turns))
     whole = x.size // m * m
-    rest = (quick[-m:] @ inverse.T) @ columns.T
-    x[:whole].reshape(-1, m)[:] -= (quick[:whole].reshape(-1, m) @ inverse.T) @ columns.T
-    x[whole:] -= rest[m - (x.size - whole) :]
+    last = (fast[-m:] @ inverse.T) @ columns.T
+    x[:whole].reshape(-1, m)[:] -= (fast[:whole].reshape(-1, m) @ inverse.T) @ columns.T
+    x[whole:] -= last[m - (x.size - whole) :]

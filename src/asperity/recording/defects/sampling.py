@@ -255,8 +255,8 @@ def even_times(time: Float) -> Float:
 def rounded_grid(time: Float) -> RoundedGrid | None:
     """The even grid that explains the stamps by rounding; None if there is no such grid.
 
-    Between gaps all steps of the grid are equal; where the sampling begins anew after a gap, the
-    samples there say.
+    Between gaps all steps of the grid are equal. The first time after a gap follows from the
+    samples after it.
 
     Parameters
     ----------
@@ -299,17 +299,18 @@ def rounded_grid(time: Float) -> RoundedGrid | None:
 
 
 def _quantum(steps: Float, exact: float) -> float | None:
-    """What stamps may have been rounded to: steps of a rounded grid take two values, one apart.
+    """The quantum of the stamps; None if no rounding explains their steps.
 
-    A quantum is no longer than a step; where it is longer than the sampling step, so that stamps
-    repeat, it is what the others rise by. What changes by more is a gap.
+    Steps of a rounded grid take two values, which differ by the quantum. A quantum shorter than the
+    sampling interval is no longer than the shortest step. Stamps with a longer quantum repeat, and
+    rise by the quantum otherwise. A larger change from one step to the next is a gap.
     """
     change = np.abs(np.diff(steps))
     low = float(steps.min())
     longest = low if low > exact else _DOUBLED * float(np.median(steps[steps > exact]))
     change[(change <= exact) | (change > longest + exact)] = np.inf
     edges = np.arange(0, change.size, _WINDOW)
-    # The last, short window says less.
+    # The last window may be too short to have such a change.
     least = np.minimum.reduceat(change, edges[:-1] if edges.size > 1 else edges)
     least = least[np.isfinite(least)]
     if not least.size:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from asperity.errors import Argument, InputError, closest, known_as, listed, printable, require
 from asperity.parameters.arguments import shown
 from asperity.recording.finding import Finding, with_cause
-from asperity.recording.readers.clock import settle_time
+from asperity.recording.readers.clock import time_axis
 from asperity.recording.readers.missing import without_codes
 from asperity.recording.readers.raw import unusable
 from asperity.recording.readers.units import (
@@ -76,7 +76,7 @@ def assemble(
     _check_kinds(roles, known)
     values = {name: column.values for name, column in recorded_columns.items()}
     try:
-        clock = settle_time(values, known, roles, rate, recorded)
+        clock = time_axis(values, known, roles, rate, recorded)
     except InputError as error:
         refused = error
         if any(f.name == "truncated" for f in findings) and "time" not in roles:

@@ -59,7 +59,7 @@ class Clock:
     dates: str | None = None
 
 
-def settle_time(
+def time_axis(
     values: Mapping[str, NDArray[Any]],
     units: Mapping[str, Unit],
     roles: Mapping[str, str],
