@@ -513,7 +513,7 @@ class Objective:
         """
         return levenberg_marquardt.predicted_decrease(*self.residuals(u), u, *self.bounds)
 
-    def held(self, u: Float, gradient: Float) -> Bool:
+    def active_bounds(self, u: Float, gradient: Float) -> Bool:
         """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
         low, high = self.bounds
         return np.asarray(np.where(gradient > 0, u - low, high - u) < levenberg_marquardt.AT_BOUND)

@@ -335,14 +335,14 @@ def design(
         plan = plan_of(plan)
     report = progress or (lambda done, total, label: None)
     candidates = candidates_of(plan, report)
-    _require_candidates(plan, candidates)
+    _require_candidates(candidates)
     values = expected_values(plan.truth)
     at = predicted(plan, plan.truth, candidates.points, values, labelled(report, "derivatives"))
     expected = expected_readings(plan, candidates.points, at.whole)
     jacobian = differences(plan.truth, expected, at, values)[1]
     unseen = ~at.seen
     candidates = candidates.without(unseen, "its derivatives were not found")
-    _require_candidates(plan, candidates)
+    _require_candidates(candidates)
     cost = plan.cost(candidates.points["V"])
     if cost.min() > plan.budget:
         rule, got = "suffice for one reading", f"{plan.budget:g} s"
@@ -354,7 +354,7 @@ def design(
     return task.measuring(simulate) if plan.rival is None else task.excluding(plan.rival, simulate)
 
 
-def _require_candidates(plan: DesignPlan, candidates: Candidates) -> None:
+def _require_candidates(candidates: Candidates) -> None:
     if not candidates.index.size:
         why = "; ".join(f"{count} times: {text}" for text, count in candidates.left_out.items())
         rule = "hold operating points at which the slider slides steadily"

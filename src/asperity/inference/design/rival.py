@@ -110,7 +110,7 @@ class RivalFit:
         residual = np.where(at.seen[:, None], residual, 0.0)
         prior, prior_slopes = self.rival.prior_residuals(u)
         slope = np.einsum("i,im,imp->p", n, residual, jacobian) + prior @ prior_slopes
-        moving = ~self.rival.held(u, slope)
+        moving = ~self.rival.active_bounds(u, slope)
         return Misfit(residual, jacobian * moving, prior, prior_slopes * moving), at.seen
 
 

@@ -163,19 +163,7 @@ def described_fit(
         warnings.append(_not_profiled(at_edge, odd))
     if bent:
         names = [objective.names[i] for i in sorted(profiled)]
-        also = [n for n in names if n not in (*bent, *at_edge)]
-        warnings.append(
-            f"chi-squared is no parabola in {enumerated([named(n) for n in bent])}: "
-            + (
-                f"intervals of {enumerated([named(n) for n in (*bent, *also)])} are by profile "
-                "likelihood"
-                f"{' but for those named before' if at_edge else ''}; take the intervals, not the "
-                "standard errors"
-                if profiled
-                else "intervals of the normal approximation are wrong there, and those by profile "
-                f"likelihood ({Argument('profile')}) take several times as long as the fit"
-            )
-        )
+        warnings.append(_no_parabola(bent, names, at_edge))
     return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
 
 
@@ -193,6 +181,19 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
         f"{', '.join(e for e in ends if e)}: their profile likelihood runs where the law hardly "
         f"has periodic orbits, which takes minutes; ask for it ({Argument('profile')}), fix a "
         "parameter or give a prior"
+    )
+
+
+def _no_parabola(bent: Sequence[str], profiled: Sequence[str], at_edge: Sequence[str]) -> str:
+    """A sentence on the parameters `bent`, in which chi-squared is no parabola."""
+    also = [n for n in profiled if n not in (*bent, *at_edge)]
+    return f"chi-squared is no parabola in {enumerated([named(n) for n in bent])}: " + (
+        f"intervals of {enumerated([named(n) for n in (*bent, *also)])} are by profile likelihood"
+        f"{' but for those named before' if at_edge else ''}; take the intervals, not the standard "
+        "errors"
+        if profiled
+        else "intervals of the normal approximation are wrong there, and those by profile "
+        f"likelihood ({Argument('profile')}) take several times as long as the fit"
     )
 
 

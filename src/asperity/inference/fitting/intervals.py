@@ -320,7 +320,7 @@ _TOLERANCE, _NEGLIGIBLE = 1e-5, 1e-3
 #: A profile that ends further below the threshold (standard deviations) was stopped by the method.
 _JUMP = 0.1
 #: If chi-squared rises by more (ten standard deviations) from one point of the profile to the next,
-#: the minimisation has left a narrow valley; the step is then halved up to so many times.
+#: the minimisation has left a narrow valley; and largest number of halvings of the step then.
 _LEAP, _HALVINGS = 100.0, 4
 #: Rise of chi-squared that stands for values without a periodic orbit.
 _NO_ORBIT = 1e3

@@ -33,9 +33,9 @@ _MINIMISED = 3
 #: Minima that differ by less in every coordinate are the same; the second number is for the coarse
 #: objective.
 _SAME, _SAME_COARSE = 1e-3, 0.02
-#: If the fast method has a solution at a smaller share of the starts, orbits are searched for at
-#: once, with so many starts: the fast method fails if the modulation is slower than sliding over
-#: the memory length, and would lead to wrong minima only.
+#: If the fast method has a solution at a smaller share of the starts, orbits are searched for from
+#: the beginning, and the second number is that of the starts: the fast method fails if the
+#: modulation is slower than sliding over the memory length, and would lead to wrong minima only.
 _RARE, _WITH_SEARCH = 1 / 16, 32
 #: Largest numbers of further starts for a table that no minimum describes: with the fast method,
 #: and with searched orbits. A start of the 600 fast tables leads to the minimum in 3 of 4 cases, in
@@ -138,7 +138,7 @@ def _by_solved_rows(
     minima = distinct(minima)
     far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
-    if ends and (not minima or lower or _blocked(objective, minima[0])):
+    if ends and (not minima or lower or _stopped_at_edge(objective, minima[0])):
         return _with_searched_orbits(objective, ends, minima, far_off=far_off)
     return minima
 
@@ -173,8 +173,8 @@ def _further(
     return [u for u in order if u.tobytes() not in taken]
 
 
-def _by_way_of_smoother(objective: Objective, starts: Sequence[Float]) -> Iterator[Minimum]:
-    """Rough minima from starts, by way of those with larger uncertainties.
+def _rough_minima_by_smoother(objective: Objective, starts: Sequence[Float]) -> Iterator[Minimum]:
+    """Rough minima from starts, after those with larger uncertainties.
 
     Larger uncertainties make chi-squared lower everywhere. A minimum at which the law is far off
     even with them leads to none that describes the data, and one that repeats another leads to the
@@ -281,7 +281,7 @@ def _by_few_rows(
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
     further = _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]
-    for new in _by_way_of_smoother(coarse, [] if _describes(coarse, roughly) else further):
+    for new in _rough_minima_by_smoother(coarse, [] if _describes(coarse, roughly) else further):
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
         if _describes(coarse, roughly):
@@ -444,7 +444,7 @@ def _apart(one: Minimum, other: Minimum) -> float:
     return float(np.abs(one.u - other.u).max())
 
 
-def _blocked(objective: Objective, end: Minimum) -> bool:
+def _stopped_at_edge(objective: Objective, end: Minimum) -> bool:
     """Whether chi-squared still falls at the point at which a minimisation has stopped.
 
     This happens if the fast method has no solution beyond this point. The minimum would be wrong,

@@ -389,7 +389,7 @@ def require_calibrated(
         raise InputError("mu0", rule, got, "free mu0, or fix it")
 
 
-#: So many equal samples in a row, with so many different values, are not equal by chance.
+#: Number of equal samples in a row, and of different values among them, that is no chance.
 _EQUAL, _DIFFERENT = 64, 16
 
 

@@ -31,7 +31,7 @@ _FILTER_SAMPLES = 8.0
 _BLOCK_SAMPLES = 4
 
 
-class Reading(eqx.Module):
+class GaugeReading(eqx.Module):
     """Arrays that turn a computed motion into recorded samples, or means over blocks.
 
     Attributes
@@ -61,7 +61,7 @@ class Reading(eqx.Module):
     per_length: Any
     means: bool = eqx.field(static=True)
 
-    def filled_up(self) -> Reading:
+    def filled_up(self) -> GaugeReading:
         """The reading padded with its last sample, to one of a few lengths."""
         extra = _padding(len(self.index))
 
@@ -105,7 +105,7 @@ class Reading(eqx.Module):
         return whole[_LATER_SAMPLES : _LATER_SAMPLES + m]
 
 
-def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
+def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> GaugeReading:
     """The reading of samples at the given times, or of means over the given blocks.
 
     Parameters
@@ -120,7 +120,7 @@ def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
         at = times if times.ndim == 1 else np.unique(times)
         index = np.arange(at.size) if times.ndim == 1 else np.searchsorted(at, times[:, 0])
         weight = np.ones((index.size, 1))
-        return Reading(_padded(at), index[:, None], weight, nothing, nothing, times.ndim == 2)
+        return GaugeReading(_padded(at), index[:, None], weight, nothing, nothing, times.ndim == 2)
     apart = np.median(np.diff(times if times.ndim == 1 else times.mean(axis=1)))
     inside = 1 if times.ndim == 1 else _BLOCK_SAMPLES
     rate = max(inside / float(apart), _FILTER_SAMPLES * gauge[1])
@@ -139,10 +139,10 @@ def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
         k = np.minimum(position.astype(np.intp), max(count - 2, 0))
         index = np.clip(k[:, None] + np.arange(-1, 3), 0, count - 1)
         cubic = [between(row, 1.0, 1.0 + position - k) for row in np.eye(4)]
-        return Reading(at, index, np.stack(cubic, axis=1), response, nothing, False)
+        return GaugeReading(at, index, np.stack(cubic, axis=1), response, nothing, False)
     index = np.minimum(position.astype(np.intp), count - 2)
     per_length = 1 / (np.diff(times)[:, 0] * rate)
-    return Reading(at, index, position - index, response, per_length, False)
+    return GaugeReading(at, index, position - index, response, per_length, False)
 
 
 def _padded(times: Float) -> Float:

@@ -21,7 +21,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
-from asperity.inference.runs.gauge import GAIN, Reading
+from asperity.inference.runs.gauge import GAIN, GaugeReading
 from asperity.inference.runs.integration import (
     Curve,
     Free,
@@ -37,8 +37,8 @@ from asperity.slider.motion import Motion
 from asperity.slider.parameters import slider_from
 from asperity.slider.problem import equation_of_motion
 
-#: Programs have room for so many steps, and for at least so many for each piece of the drive: after
-#: a change of the load, some 8 follow the evolution of friction.
+#: Smallest number of steps of a program, and of its steps for each piece of the drive: after a
+#: change of the load, some 8 follow the evolution of friction.
 _STEPS, _STEPS_EACH = 2048, 16
 #: Room that is used if no start can be computed with less. A motion with more steps is taken for
 #: stick-slip, which a fit of sliding cannot follow.
@@ -92,7 +92,7 @@ def recorded_friction(
     values: Mapping[str, float],
     free: tuple[str, ...],
     drive: Drive,
-    reading: Reading,
+    reading: GaugeReading,
     room: int | None = None,
 ) -> tuple[Float, Float] | None:
     """Friction at the samples of a run; None if the motion runs away or cannot be computed.
@@ -108,7 +108,7 @@ def recorded_friction(
     free : tuple of str
         Names in `values` for derivatives.
     drive : Drive
-    reading : Reading
+    reading : GaugeReading
     room : int, optional
         Largest number of steps of the integrator, that of `room_for` by default.
 
@@ -144,7 +144,7 @@ def _read(
     free: Free,
     given: dict[str, Any],
     drive: Drive,
-    reading: Reading,
+    reading: GaugeReading,
     curve: Curve,
     slopes: Curve,
     steps: Array,
@@ -171,7 +171,7 @@ def _recorded(
     values: Mapping[str, Array],
     curve: Curve,
     steps: Array,
-    reading: Reading,
+    reading: GaugeReading,
 ) -> Array:
     """F/W as the gauge records it."""
     motion, drive, times = with_values(motion, values), shifted(drive, values), reading.times
@@ -260,7 +260,7 @@ class RunArrays(NamedTuple):
     fixed : dict of str to array, shape ()
         Parameters of the motion that are not free.
     drive : Drive
-    reading : Reading
+    reading : GaugeReading
     recorded : array, shape (n,)
     noise : tuple of Whitening
         Noise of each stretch.
@@ -271,7 +271,7 @@ class RunArrays(NamedTuple):
     motion: Any
     fixed: dict[str, Any]
     drive: Drive
-    reading: Reading
+    reading: GaugeReading
     recorded: Any
     noise: tuple[Whitening, ...]
     basis: Any

@@ -150,7 +150,8 @@ def _at_samples(
     )
 
 
-#: A misfit is searched in so many samples after a change, and before it: its time is uncertain.
+#: Numbers of samples after a change, and number before it, in which a misfit is searched: the time
+#: of a change is uncertain.
 _AFTER, _BEFORE = (5, 20, 80), 5
 
 

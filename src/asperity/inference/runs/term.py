@@ -51,7 +51,7 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _CUT_INTERVALS = 2.0
 #: The law fails if such large innovations after changes have a lower probability.
 _LAW_FAILS = 1e-4
-#: A sample with a larger leverage says alone when a velocity changes. In 60 recordings of compliant
+#: A sample with a larger leverage alone determines a delay. In 60 recordings of compliant
 #: machines no sample next to a change has more than 0.65; on stiff machines half of them have more
 #: than 0.9, and intervals that count those above 0.99 are too narrow.
 _ALONE = 0.99
@@ -315,7 +315,7 @@ class RunTerm(DataTerm):
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """As in `DataTerm`, with the addition of samples that say alone when a velocity changes.
+        """As in `DataTerm`, with the addition of samples that alone determine a delay.
 
         If the spring relaxes between two samples, friction jumps, and a delay ends where the jump
         reaches a sample. Close to there the sample seems to determine the delay, as friction at
