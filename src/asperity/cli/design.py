@@ -104,21 +104,7 @@ def _sections(result: Design) -> list[Section]:
         *(f"  {count} cannot: {reason}" for reason, count in result.left_out.items()),
     ]
     if plan.rival is not None:
-        values = "; ".join(f"{symbol(n)} = {v:.4g}" for n, v in (result.rival_values or {}).items())
-        chi2, chi2_grid, probable, on_grid = (
-            f"{x:.{digits}g}" if x is not None and math.isfinite(x) else "unknown"
-            for x, digits in (
-                (result.chi2, 4),
-                (result.chi2_grid, 4),
-                (result.probability, 3),
-                (result.probability_grid, 3),
-            )
-        )
-        lines.append(
-            f"expected chi-squared {chi2} (even grid {chi2_grid}), "
-            f"probability of deciding {probable} (even grid {on_grid}); "
-            f"{plan.rival.law.name} comes nearest with {values}"
-        )
+        lines.append(_separation(result, plan.rival.law.name))
     for axis, levels in result.alone.items():
         best = min(levels, key=lambda level: level[2])
         several = [f"{format_si(v, known[axis].kind, 3)}: {more:.3g}" for v, _, more in levels]
@@ -143,3 +129,22 @@ def _sections(result: Design) -> list[Section]:
         title = f"{s.sets} simulated fits{decided}"
         sections.append(Section(title, head=("", "spread", "expected"), rows=spread))
     return [*sections, Section("", warnings=tuple(result.warnings))]
+
+
+def _separation(result: Design, rival: str) -> str:
+    """A sentence on how well a design excludes a rival."""
+    values = "; ".join(f"{symbol(n)} = {v:.4g}" for n, v in (result.rival_values or {}).items())
+    chi2, chi2_grid, probable, on_grid = (
+        f"{x:.{digits}g}" if x is not None and math.isfinite(x) else "unknown"
+        for x, digits in (
+            (result.chi2, 4),
+            (result.chi2_grid, 4),
+            (result.probability, 3),
+            (result.probability_grid, 3),
+        )
+    )
+    return (
+        f"expected chi-squared {chi2} (even grid {chi2_grid}), "
+        f"probability of deciding {probable} (even grid {on_grid}); "
+        f"{rival} comes nearest with {values}"
+    )

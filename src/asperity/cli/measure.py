@@ -393,7 +393,6 @@ def _campaign(
     jobs: int | None,
     output: Output,
 ) -> int:
-
     from asperity.cli.progress import bar
     from asperity.measurement.campaign import run_campaign
     from asperity.measurement.report import healing_section

@@ -85,11 +85,11 @@ class Shell(click.Group):
             except click.Abort as abort:
                 code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
             except click.ClickException as error:
-                code = _print_error(str(_in_our_words(error)), _BAD_INPUT)
+                code = _print_error(str(_as_input_error(error)), _BAD_INPUT)
         sys.exit(code)
 
 
-def _in_our_words(error: click.ClickException) -> InputError:
+def _as_input_error(error: click.ClickException) -> InputError:
     """Click's message about options and arguments as an `InputError`."""
     command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else ""
     if isinstance(error, click.MissingParameter) and error.param is not None:

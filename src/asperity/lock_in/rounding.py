@@ -24,7 +24,7 @@ from asperity.lock_in.reading import LockInReading
 
 #: Samples in which steps are searched, and terms of the sum.
 _SEARCHED, _TERMS = 1 << 14, 50
-#: Noise of so many steps leaves no error, exp(-2 pi^2 100) = 0 in doubles; a wrong value of 1e-300
+#: Noise of ten steps leaves no error, exp(-2 pi^2 100) = 0 in doubles; a wrong value of 1e-300
 #: in a damaged file makes steps whose ratio to the noise has no square.
 _SMOOTH = 10.0
 
@@ -32,7 +32,8 @@ _SMOOTH = 10.0
 def step_of(values: Float) -> float:
     """Smallest difference between values that differ, (n,); 0 for a constant.
 
-    A modulation repeats no sample, by which `asperity.recording.defects.levels.recorder_step` goes.
+    `asperity.recording.defects.levels.recorder_step` needs repeated samples, which a modulated
+    signal does not have.
     """
     steps = np.diff(np.unique(values[:_SEARCHED]))
     return float(steps.min()) if steps.size else 0.0
@@ -79,7 +80,7 @@ def common_phases(cycles: Float, steps: float) -> float:
         Amplitude of the fundamental in steps of the recorder.
     """
     cycles = cycles[:_SEARCHED]
-    # A signal passes about so many steps in a period, and has as many independent errors at most.
+    # Steps that the signal passes in a period; it has as many independent errors at most.
     passed = min(2 * np.pi * steps, cycles.size)
     phases = np.unique((cycles % 1.0 * passed).astype(int)).size
     return float(phases) if 2 * phases < passed else np.inf

@@ -89,10 +89,6 @@ class Source(ReadingRecipe):
         return {name: value for name, value in named.items() if value not in (None, {})}
 
 
-def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple(sorted(times))
-
-
 def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     """Holds in their order, each with a begin and an end."""
     for start, end in spans:
@@ -158,7 +154,7 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: Annotated[Times, AfterValidator(_in_order)] | None = None
+    steps: Annotated[Times, AfterValidator(lambda times: tuple(sorted(times)))] | None = None
     velocities: Velocities | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: StrictBool | None = None

@@ -110,7 +110,7 @@ class SweepStore:
             return False
 
     def states(self, chunks: Iterable[int] | None = None) -> Iterator[tuple[int, int, bool]]:
-        """Of all chunks or of `chunks` those that are done: failed points, and if sound."""
+        """Number of each chunk that is done, its failed points, and whether it is sound."""
         for chunk in range(self.grid.chunk_count) if chunks is None else chunks:
             # A chunk that a driver is writing may appear damaged once.
             for _ in range(2):
@@ -124,7 +124,7 @@ class SweepStore:
                 yield chunk, failed, sound
 
     def done(self, chunks: Iterable[int] | None = None) -> Iterator[int]:
-        """Of all chunks or of `chunks` those that are done.
+        """Numbers of the chunks that are done, of all or of `chunks`.
 
         Raises
         ------
