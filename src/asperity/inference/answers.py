@@ -150,7 +150,7 @@ def read_data(
         elif kind == "readings":
             result.append(read_table(data.file, at, name=data.name))
         else:
-            trace, reading = _recording(data, read), _reading(data)
+            trace, reading = _recording(data, read), _run_arguments(data)
             cycle = None
             if data.steps is None and data.velocities is None:
                 cycle = _stick_slip(trace, reading["name"], question.fixed, data.window)
@@ -227,7 +227,7 @@ def _stick_slip(
     return averaged_cycle(measurement, name)
 
 
-def _reading(data: questions.Data) -> dict[str, Any]:
+def _run_arguments(data: questions.Data) -> dict[str, Any]:
     """Arguments with which a trace becomes a run, without the window."""
     return {
         "name": Path(data.name or data.file).stem,
@@ -330,7 +330,7 @@ def answer_fit(
         law or default_law(()),
         question.free,
         None if windows == "auto" else windows,
-        reading={n: v for n, v in _reading(recording).items() if v is not None},
+        reading={n: v for n, v in _run_arguments(recording).items() if v is not None},
         **options,
     )
 

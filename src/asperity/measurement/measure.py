@@ -208,7 +208,7 @@ def _prepared(trace: Trace, question: Question) -> _ModulatedRecording:
     start = line.frequency
     if question.frequency is not None and question.exact_frequency:
         start = question.frequency
-    return _ModulatedRecording(samples, _parts(samples, line, start), start, question)
+    return _ModulatedRecording(samples, _load_intervals(samples, line, start), start, question)
 
 
 def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Measurement:
@@ -223,7 +223,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         inside, degree = slice(first, stop), DRIFTS[question.detrend]
         first += settled(samples.time[inside], samples.force[inside], start, degree)
     else:
-        first, stop = _given(samples.time, window)
+        first, stop = _rows_of_window(samples.time, window)
         # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
     if question.whole_periods:
@@ -244,7 +244,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     steps = step_of(load), step_of(force)
     reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if window is None else "user"
-    before, after = _steady_pauses(*_around(samples, parts, chosen, reading.W0, steps))
+    before, after = _steady_pauses(*_pauses_around(samples, parts, chosen, reading.W0, steps))
     pauses = [before.rate] if before and before.rate else []
     if before and after:
         pauses.append(rate_between(before.force, after.force))
@@ -357,7 +357,7 @@ def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None
     return answers
 
 
-def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadInterval]:
+def _load_intervals(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadInterval]:
     whole = LoadInterval(0, samples.time.size, line.amplitude)
     if line.amplitude < _LINE * line.background:
         return [whole]
@@ -365,7 +365,7 @@ def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadI
     return parts if any(part.modulated for part in parts) else [whole]
 
 
-def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
+def _rows_of_window(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     start, end = window
     first = int(np.searchsorted(time, start, side="left"))
     stop = int(np.searchsorted(time, end, side="right"))
@@ -376,7 +376,7 @@ def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     return first, stop
 
 
-def _around(
+def _pauses_around(
     samples: Samples,
     parts: list[LoadInterval],
     chosen: LoadInterval,

@@ -111,9 +111,9 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
             mistakes.append(error.about(place) if error.rule else f"axes.{name}: {error}")
     if not plan.axes:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
-    with _noted(mistakes):
+    with _collecting(mistakes):
         numbers, origins = _numbers(plan, axes, laws, known)
-    with _noted(mistakes):
+    with _collecting(mistakes):
         solve = SOLVES[plan.solve]
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
@@ -126,12 +126,12 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         # A column that varies together with others may be a label without influence.
         alone = [names[0] for names in columns if len(names) == 1]
         varied = dict.fromkeys(itertools.chain(*columns), 1.0)
-        with _noted(mistakes):
+        with _collecting(mistakes):
             require_influence(alone, {**numbers, **varied}, "axes.{}")
-        with _noted(mistakes):
+        with _collecting(mistakes):
             fixed = [name for name, origin in origins.items() if origin == "plan"]
             require_influence(fixed, {**numbers, **varied})
-        with _noted(mistakes):
+        with _collecting(mistakes):
             mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
@@ -150,7 +150,7 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
 
 
 @contextmanager
-def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
+def _collecting(mistakes: list[str | InputError]) -> Iterator[None]:
     """Add an `InputError` of the block to the mistakes of a plan, which are reported together."""
     try:
         with keys_of_file({"numbers": "parameters"}):
@@ -200,7 +200,7 @@ def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):
-        with _noted(mistakes):
+        with _collecting(mistakes):
             names.append(law_name(law, plan.folder))
     if not plan.laws:
         mistakes.append(

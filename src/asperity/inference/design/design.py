@@ -520,7 +520,7 @@ class _Task:
         simulation = None
         if simulate:
             simulation = self._simulated(n.astype(float), simulate, rival)
-            warnings += _surprises(simulation, errors)
+            warnings += _deviations_of_simulation(simulation, errors)
         return Design(
             plan=self.plan,
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
@@ -663,7 +663,9 @@ def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
     return float(half[0]), float(half[1:].std())
 
 
-def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
+def _deviations_of_simulation(
+    simulation: Simulated, errors: Mapping[str, ExpectedError]
+) -> list[str]:
     """Sentences on simulated fits that differ from the expected errors."""
     warnings = []
     if simulation.failed:

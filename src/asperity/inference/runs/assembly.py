@@ -402,7 +402,7 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
         If 64 successive samples, with at least 16 different values, occur in two recordings.
     """
     for first, second in combinations(runs, 2):
-        shared = _shared(first.friction, second.friction)
+        shared = _same_samples(first.friction, second.friction)
         if shared is None:
             continue
         a, b = (run.origin + run.time[k] for run, k in zip((first, second), shared, strict=True))
@@ -411,7 +411,7 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
         raise InputError(second.name, "hold samples of its own", got, advice)
 
 
-def _shared(x: Float, y: Float) -> tuple[int, int] | None:
+def _same_samples(x: Float, y: Float) -> tuple[int, int] | None:
     """Indices in x and y of the first run of samples that both contain; None without."""
     rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
     various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT

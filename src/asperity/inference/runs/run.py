@@ -383,7 +383,7 @@ def _load(
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
     at = _corner_times(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
-    at = _placed(t, W, at)
+    at = _fitted_corners(t, W, at)
     values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
     return float(values[0]), unit, True, at, values
@@ -445,7 +445,7 @@ def _corner_times(t: Float, y: Float, knots: Sequence[int], tolerance: float) ->
     return np.array(kept)
 
 
-def _placed(t: Float, y: Float, at: Float) -> Float:
+def _fitted_corners(t: Float, y: Float, at: Float) -> Float:
     """Corners moved by up to an interval, to the best fit of the lines on both sides to y."""
     placed = at.copy()
     for k in range(1, at.size - 1):

@@ -205,7 +205,7 @@ def read_table(
         content = file_content(path)
         if path.suffix.lower() == ".json":
             text = content.decode("utf-8-sig")
-            return table_of(_given(_reading(shown, text), given), name=shown)
+            return table_of(_completed(_row_of_reading(shown, text), given), name=shown)
     csv = sheet(path, lambda n: _is_read(n) and n not in _TEXTS, content=content)
     cells = list(csv.rows())
     texts, units = _columns(shown, csv.heading, cells)
@@ -239,7 +239,7 @@ def read_table(
     if _UNIT in texts and "W0" in columns and "W0" not in units:
         columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT].tolist())
     run = next((texts[n].tolist() for n in _RUN if n in texts), None)
-    columns = _given(columns, given)
+    columns = _completed(columns, given)
     return table_of(columns, name=shown, run=run, remarks=remarks, row_names=names)
 
 
@@ -286,7 +286,7 @@ def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
     )
 
 
-def _given(columns: dict[str, Any], given: Mapping[str, Any] | None) -> dict[str, Any]:
+def _completed(columns: dict[str, Any], given: Mapping[str, Any] | None) -> dict[str, Any]:
     """Columns, completed by numbers that hold for all rows."""
     known = _known()
     have = {canonical_name(name, known) for name in columns}
@@ -294,7 +294,7 @@ def _given(columns: dict[str, Any], given: Mapping[str, Any] | None) -> dict[str
     return columns | more
 
 
-def _reading(shown: str, text: str) -> dict[str, Any]:
+def _row_of_reading(shown: str, text: str) -> dict[str, Any]:
     """Columns of one reading, from the JSON of ``asperity measure``."""
     wrong = InputError(
         f"{shown} must be what 'asperity measure --json' prints for a modulated recording, got "

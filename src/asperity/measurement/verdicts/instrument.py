@@ -257,7 +257,7 @@ def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> 
             if gained == -np.inf:
                 sentence = "the mean cycle has too few samples to show whether it is cut off flat"
             continue
-        gain, level = _compared(cycle)
+        gain, level = _gain_of_levels(cycle)
         gained = max(gained, gain)
         if gain > _MARGIN and level.share > number:
             number = level.share
@@ -305,7 +305,7 @@ def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int
     return _Cycle(place, folded, np.hypot(np.sqrt(noise / samples), _LEFT * height))
 
 
-def _compared(cycle: _Cycle) -> tuple[float, _Level]:
+def _gain_of_levels(cycle: _Cycle) -> tuple[float, _Level]:
     """Gain in the criterion of the best description that is cut off, and this description."""
     # With a large mean the squares would leave no digits to the cycle.
     cycle = cycle._replace(value=cycle.value - cycle.value.mean())

@@ -130,12 +130,12 @@ def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any
     attributes : mapping
         Attributes of the longer store that do not follow from its grid.
     """
-    for chunk in _touched(root.grid, grid):
+    for chunk in _chunks_with_new_points(root.grid, grid):
         reset(path, root.grid, chunk)
     lay_out(path, grid, {"runs": root.runs, **attributes})
 
 
-def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
+def _chunks_with_new_points(old: SweepGrid, new: SweepGrid) -> list[int]:
     """Incomplete chunks at the end of an axis that get new points."""
     shape = old.chunk_shape
     touched = np.zeros(shape, dtype=bool) if math.prod(shape) else np.zeros(0, dtype=bool)
