@@ -40,6 +40,8 @@ _MILD = 8.0
 
 
 class _ModalTableau(NamedTuple):
+    """The Radau method of s stages, in the eigenvectors of the inverse of its matrix a."""
+
     c: np.ndarray  # (s,)
     a: np.ndarray  # (s, s)
     inverse: np.ndarray  # of a
@@ -138,11 +140,11 @@ def _step(
     def unfinished(carry: tuple) -> Array:
         _, steps, size, rate = carry
         hopeless = (steps > 1) & (rate > 2)
-        return (steps < _NEWTON_STEPS) & (_left(size, rate) > _NEWTON_SHARE) & ~hopeless
+        return (steps < _NEWTON_STEPS) & (_remaining_change(size, rate) > _NEWTON_SHARE) & ~hopeless
 
     start = (guess[:n], jnp.asarray(0), jnp.asarray(1.0), jnp.asarray(1.0))
     Z, steps, size, rate = jax.lax.while_loop(unfinished, newton, start)
-    converged = _left(size, rate) <= _NEWTON_SHARE
+    converged = _remaining_change(size, rate) <= _NEWTON_SHARE
     _, x_rate = system.motion_rates(at, Y[:n, None] + Z)
     x = h * (jnp.asarray(table.a) @ (x_rate * jnp.ones(STAGES)))
     Z = jnp.concatenate([Z, x[None]])
@@ -154,6 +156,6 @@ def _step(
     return Z, jnp.where(converged, size, jnp.inf), steps, spectral_radius(jacobian)
 
 
-def _left(size: Array, rate: Array) -> Array:
+def _remaining_change(size: Array, rate: Array) -> Array:
     """Sum of the corrections still to come, if they fall geometrically."""
     return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)

@@ -54,7 +54,6 @@ class _Header:
     """Header of a file, read with one number of slots."""
 
     title: str
-    records: int
     dtime: float
     channels: tuple[_Channel, ...]
     size: int
@@ -73,12 +72,12 @@ def is_format(path: Path) -> bool:
 def read(path: Path) -> RawRecording:
     """Columns of a LOOK file; it has no groups."""
     raw = np.fromfile(path, dtype=np.uint8)
-    readings = _headers(raw[: 1 << 12].tobytes())
-    if not readings:
+    headers = _headers(raw[: 1 << 12].tobytes())
+    if not headers:
         raise unusable(path, "whose LOOK header is not whole or not one")
     pairs = [
         (header, dtype)
-        for header in readings
+        for header in headers
         for dtype in _TYPES
         if header.size + header.elements * np.dtype(dtype).itemsize == raw.size
     ]
@@ -136,7 +135,7 @@ def _header(head: bytes, slots: int) -> _Header | None:
             used.append(_Channel(name, units, comment or "", elements or records))
     if not used:
         return None
-    return _Header(_text(title) or "", records, dtime, tuple(used), size)
+    return _Header(_text(title) or "", dtime, tuple(used), size)
 
 
 def _text(raw: bytes) -> str | None:

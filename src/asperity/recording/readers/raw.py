@@ -263,7 +263,7 @@ def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawCol
 
 
 def _texts_in(about: Mapping[str, Any], wanted: frozenset[str], number: int) -> list[str] | None:
-    """The list of so many texts in `about` under one of the wanted names."""
+    """The list of `number` texts in `about` under one of the wanted names; None without it."""
     for name, value in about.items():
         if plain(name) in wanted:
             texts = as_texts(value)
