@@ -36,7 +36,7 @@ _FEWEST, _FEWEST_OF_TREND = 3, 8
 _LONG = 5.0
 #: Number of events on each side that give the usual loading slope; ratio of the two slopes above
 #: which the velocity or the stiffness has changed.
-_NEAR, _OTHER = 5, 1.5
+_NEIGHBOURS, _CHANGED = 5, 1.5
 #: A part without events is a stick if the force rises by more than this share of usual loading.
 _LOADED = 0.5
 #: Largest relative spread of the loading slopes of a spring, for many events and for few: that of
@@ -114,16 +114,16 @@ def regimes(
     """
     if not len(events):
         return (_without_events(time, force, smallest_drop, falls, impulses),)
-    cycle, slope = _usual(events.recurrence), _usual(events.loading_slope)
+    cycle, slope = _neighbours_median(events.recurrence), _neighbours_median(events.loading_slope)
     cycle = np.where(np.isfinite(cycle), cycle, float(time[-1] - time[0]) / 2)
     quiet = events.onset[1:] - events.end[:-1]
     rise = events.force_before[1:] - events.force_after[:-1]
     loads = rise > _LOADED * np.minimum(slope[:-1], slope[1:]) * quiet
     slides = (quiet > _LONG * np.maximum(cycle[:-1], cycle[1:])) & ~loads
-    lasts = np.flatnonzero(slides | loading_changes(events.loading_slope))
+    last_events = np.flatnonzero(slides | loading_changes(events.loading_slope))
     parts: list[Regime] = []
     edge, first = float(time[0]), 0
-    for stop in [*(lasts + 1), len(events)]:
+    for stop in [*(last_events + 1), len(events)]:
         begin, end = float(events.onset[first]), float(events.end[stop - 1])
         usual = float(cycle[first]), float(slope[first])
         parts += _between(time, force, (edge, begin), first, *usual)
@@ -148,38 +148,37 @@ def _without_single_events(parts: list[Regime]) -> list[Regime]:
     return merged
 
 
-def _usual(values: Float) -> Float:
+def _neighbours_median(values: Float) -> Float:
     """Medians over the neighbours on both sides; NaN for a single event, which has no stick."""
     if values.size < 2:
         return values
     known = np.concatenate([values[1:2], values[1:]])
-    return np.asarray(median_filter(known, 2 * _NEAR - 1, mode="reflect"))
+    return np.asarray(median_filter(known, 2 * _NEIGHBOURS - 1, mode="reflect"))
 
 
 def loading_changes(slope: Float) -> Bool:
-    """Events after which the loading slope changes, because velocity or stiffness has changed.
+    """Whether the loading slope changes after each event but the last.
 
-    An entry for each stick; entry k is true where the events up to k load otherwise than those
-    from k + 1 on.
+    The velocity or the stiffness has then changed.
     """
     changed = np.zeros(max(slope.size - 1, 0), bool)
     # The first event has no stick before it.
     known = slope[1:]
-    if known.size < 2 * _NEAR + 1:
+    if known.size < 2 * _NEIGHBOURS + 1:
         return changed
-    windows = np.lib.stride_tricks.sliding_window_view(known, _NEAR)
+    windows = np.lib.stride_tricks.sliding_window_view(known, _NEIGHBOURS)
     # The stick in which the loading changes belongs to neither side.
-    before, after = windows[: -_NEAR - 1], windows[_NEAR + 1 :]
+    before, after = windows[: -_NEIGHBOURS - 1], windows[_NEIGHBOURS + 1 :]
     first, second = np.median(before, 1), np.median(after, 1)
     jump = np.abs(second - first)
     scatter = np.ptp(before, 1) + np.ptp(after, 1)
     loading = np.minimum(first, second) > 0
-    other = jump > (_OTHER - 1) * np.minimum(first, second)
-    clear = np.flatnonzero(loading & other & (jump > 2 * scatter))
+    differs = jump > (_CHANGED - 1) * np.minimum(first, second)
+    clear = np.flatnonzero(loading & differs & (jump > 2 * scatter))
     # Among neighbouring places, the one with the most uniform slopes on both sides.
     for group in np.split(clear, np.flatnonzero(np.diff(clear) > 1) + 1):
         if group.size:
-            changed[group[np.argmin(scatter[group])] + _NEAR] = True
+            changed[group[np.argmin(scatter[group])] + _NEIGHBOURS] = True
     return changed
 
 
