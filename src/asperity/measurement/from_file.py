@@ -123,7 +123,7 @@ def answer_measurement(
     InputError
         As in `measure_recording`.
     """
-    result, note = _either(trace, question, measure, plain=plain)
+    result, note = _by_kind_of_motion(trace, question, measure, plain=plain)
     if not isinstance(result, StickSlipMeasurement):
         advice = f"leave it out, or give {Argument('measure.stick_slip')} too"
         _require_unset(question, OF_SLIPS, "slip events", "a recording without them", advice)
@@ -149,10 +149,10 @@ def measured_parts(
     trace: Trace, question: Question
 ) -> list[Measurement | InputError] | SlidingMeasurement | StickSlipMeasurement:
     """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
-    return _either(trace, question, measure_amplitudes)[0]
+    return _by_kind_of_motion(trace, question, measure_amplitudes)[0]
 
 
-def _either(
+def _by_kind_of_motion(
     trace: Trace,
     question: Question,
     modulated: Callable[[Trace, Question], Read],

@@ -121,7 +121,7 @@ def described_fit(
         outliers, lower = _outliers(objective, at)
     # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
-    bent = [] if profile or far_off else _bent(objective, at)
+    bent = [] if profile or far_off else _not_parabolic(objective, at)
     if not objective.noise_is_known and (open_ended := _open_ended(objective, at, bent)):
         at = replace(at, undetermined=tuple(dict.fromkeys([*at.undetermined, *open_ended])))
         bent = [name for name in bent if name not in open_ended]
@@ -352,7 +352,7 @@ def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
     }
 
 
-def _bent(objective: Objective, at: Parabola) -> list[str]:
+def _not_parabolic(objective: Objective, at: Parabola) -> list[str]:
     """Parameters for which the normal approximation fails.
 
     Two standard deviations away in a coordinate, with the other coordinates following, chi-squared

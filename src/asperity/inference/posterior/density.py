@@ -191,7 +191,7 @@ class Whitened:
         # At least a tenth of a standard deviation away from the bounds.
         step = 0.1 * np.minimum(sd, high - low)
         start = coordinates.to_q(np.clip(u, low + step, high - step))
-        near = cls(objective, coordinates, start, np.eye(len(u)))._rooted(start)
+        near = cls(objective, coordinates, start, np.eye(len(u)))._whitened_about(start)
         climbed = minimize(
             lambda z: -near.log_density(z)[0],
             np.zeros(len(u)),
@@ -200,9 +200,9 @@ class Whitened:
             method="trust-exact",
             options={"gtol": _REACHED, "maxiter": _STEPS},
         )
-        return near._rooted(start + near.root @ climbed.x)
+        return near._whitened_about(start + near.root @ climbed.x)
 
-    def _rooted(self, q: Float) -> Whitened:
+    def _whitened_about(self, q: Float) -> Whitened:
         """The posterior whitened about another point, with the root of its covariance there."""
         return replace(self, mode=q, root=_root(self._evaluated(q)[2]))
 
