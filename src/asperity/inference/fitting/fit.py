@@ -204,8 +204,9 @@ def with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[M
     for hold in objective.terms_of(HoldTerm) if not objective.noise_is_known else ():
         # With priors the estimates depend on the error, and the error on the estimates.
         for _ in range(_ROUNDS):
-            (data,), (_, J) = objective.data_residuals(u) or (), objective.residuals(u)
-            changed = hold.estimate_error(data, J.T @ J)
+            data, (_, J) = objective.data_residuals(u), objective.residuals(u)
+            assert data is not None  # there is a solution at a minimum
+            changed = hold.estimate_error(data[0], J.T @ J)
             objective.forget()
             u = objective.minimise(u).u
             if abs(changed - 1) < _AGREED:
