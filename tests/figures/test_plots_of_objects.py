@@ -86,6 +86,8 @@ def test_the_title_of_a_modulation_without_first_harmonic_of_the_load_leaves_eps
     assert "ε 0.1" in response.plot().get_suptitle()
     pulled = dataclasses.replace(response, load=asp.loads.modulated(pull=0.5))
     assert "ε" not in pulled.plot().get_suptitle()
+    assert "epsilon=" in repr(response)
+    assert "epsilon=" not in repr(pulled)
 
 
 def test_a_file_in_place_of_the_set_of_names_is_refused() -> None:

@@ -60,8 +60,11 @@ def test_a_modulated_pull_moves_the_slider(law):
 def test_no_age_where_the_law_has_none():
     material = asp.materials.load("bureau2000")
     slider = asp.Slider(material.law("amontons"), spring=material.K, load=material.W0)
-    response = asp.periodic_response(slider, velocity=V, epsilon=EPSILON, frequency=F, waveform=64)
-    assert over_a_period(response).age is None
+    drive = {"velocity": V, "epsilon": [[EPSILON]], "frequency": F}
+    period = over_a_period(asp.periodic_response(slider, **drive, waveform=64))
+    assert period.age is None
+    # Also of a point in a grid of one row and one column.
+    assert {np.shape(values) for values in period[:5]} == {(64,)}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from asperity.errors import require
 from asperity.figures.map import axis_unit, label
 from asperity.figures.style import ELASTO_PLASTIC, GREY, RICE_RUINA, new_figure
-from asperity.loads import Harmonic
 from asperity.units import format_si
 
 if TYPE_CHECKING:
@@ -135,7 +134,8 @@ def _cycle(response: PeriodicResponse) -> Figure:
     time.set(xlabel="time (periods of the load)", ylabel="$F/W_0$")
     time.margins(y=0.2)
     load = time.twinx()
-    load.plot(theta / (2 * np.pi), response.load.at(theta).w, color=GREY, linestyle="dotted")
+    w = np.ravel(response.load.at(theta).w)
+    load.plot(theta / (2 * np.pi), w, color=GREY, linestyle="dotted")
     load.set_ylabel("$W/W_0$ (dotted)", color=GREY)
     spectrum.bar(order, np.abs(harmonics), width=0.6, color=RICE_RUINA)
     spectrum.set(xlabel="harmonic", ylabel="amplitude of $F/W_0$", yscale="log", xticks=order)
@@ -147,8 +147,7 @@ def _cycle(response: PeriodicResponse) -> Figure:
             ("ε", response.epsilon, "dimensionless"),
             ("f", response.frequency, "frequency"),
         )
-        # The first harmonic of the load says nothing of a modulation that leaves it out.
-        if name != "ε" or isinstance(response.load, Harmonic) or np.any(value)
+        if name != "ε" or response.has_epsilon
     )
     state = "stable" if response.stable.item() else "unstable"
     state += f", mean {mean:.4g}, without modulation {steady:.4g}"

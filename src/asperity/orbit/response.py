@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError
-from asperity.loads import Modulation
+from asperity.loads import Harmonic, Modulation
 from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
 from asperity.orbit.outcome import Outcome, sentences
 from asperity.orbit.solution import Solution
@@ -143,6 +143,11 @@ class PeriodicResponse(Drawn):
         return np.asarray(self.load.amplitude)
 
     @property
+    def has_epsilon(self) -> bool:
+        """Whether the load is harmonic or has a first harmonic; a modulated pull has none."""
+        return isinstance(self.load, Harmonic) or bool(np.any(self.epsilon))
+
+    @property
     def frequency(self) -> Float:
         """Modulation frequency (Hz)."""
         return np.asarray(self.motion.omega) / (2 * np.pi)
@@ -164,12 +169,12 @@ class PeriodicResponse(Drawn):
 
     @property
     def phase1(self) -> Float:
-        """Phase of the first harmonic against cos wt (rad)."""
+        """Phase of the first harmonic against cos wt (rad); round-off without modulation."""
         return np.angle(self.harmonics[..., 0])
 
     @property
     def phase2(self) -> Float:
-        """Phase of the second harmonic against cos 2wt (rad)."""
+        """Phase of the second harmonic against cos 2wt (rad); round-off without modulation."""
         return np.angle(self.harmonics[..., 1])
 
     @property
@@ -232,8 +237,8 @@ class PeriodicResponse(Drawn):
         """Law, equation of motion, and the outcome."""
         law, points = self.slider.law.name, self.mean_friction.size
         title = f"PeriodicResponse, {law}, {self.motion.name}, {count_text(points, 'point')}"
-        drive = ((n, getattr(self, DRIVE[n].argument)) for n in ("V", "epsilon", "frequency"))
-        lines = [parameter_line(DRIVE[name], value) for name, value in drive]
+        names = ("V", "epsilon", "frequency") if self.has_epsilon else ("V", "frequency")
+        lines = [parameter_line(DRIVE[n], getattr(self, DRIVE[n].argument)) for n in names]
         lines += [
             number_line(name, getattr(self, name), OUTPUTS[name].meaning)
             for name in ("mean_friction", "delta_mu", "mu1", "mu2", "floquet_max")

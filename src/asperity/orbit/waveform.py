@@ -80,16 +80,16 @@ def over_a_period(response: PeriodicResponse) -> Period:
     K, W0, M = (float(np.ravel(getattr(slider, n))[0]) for n in ("K", "W0", "M"))
     force, log_slip = response.waveform.reshape(2, -1)
     slip = np.exp(log_slip)
-    at = response.load.at(response.theta)
+    at = jax.tree.map(np.ravel, response.load.at(response.theta))
     slips_with_slider = slider.law.rate_dependent and not np.any(
         np.asarray(slider.law.elastic_length) > 0
     )
     stretching = omega * W0 / (K * V) * _derivative(force)
-    velocity = slip if slips_with_slider else np.asarray(at.pull) - stretching
+    velocity = slip if slips_with_slider else at.pull - stretching
     friction = force - float(np.ravel(motion.damping)[0]) * velocity
     if "inertial" in motion.name:
         friction = friction - M * V * omega / W0 * _derivative(velocity)
-    load = np.asarray(at.w) * np.ones(len(force))
+    load = at.w * np.ones(len(force))
     age = None
     has_age = slider.law.state_names == ("log_age",) or isinstance(slider.law, LinkerDieterich)
     if isinstance(response.load, Harmonic) and has_age:
