@@ -164,10 +164,10 @@ class Unknown:
         low, high = self.bounds
         if self.prior is not None:
             first, last = (self.prior.mean + s * _REACH * self.prior.sd for s in (-1, 1))
+            usual = first / self.scale, last / self.scale
             if self.logarithmic:
-                return low, min(high, math.log(last))
-            return max(low, first / self.scale), min(high, last / self.scale)
-        if self.logarithmic:
+                usual = low, math.log(last)
+        elif self.logarithmic:
             usual = math.log(self.start[0] / _LOGARITHMIC), math.log(self.start[1] * _LOGARITHMIC)
         else:
             top = _LINEAR * abs(self.start[1]) / self.scale

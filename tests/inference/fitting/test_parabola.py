@@ -8,7 +8,7 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 from scipy.stats import norm
 
-from asperity.inference import RunOptions, fit
+from asperity.inference import Prior, RunOptions, fit
 from asperity.inference.fitting.assembly import Given, listed_data, objective_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.intervals import (
@@ -61,6 +61,18 @@ def test_whether_data_determine_a_parameter_does_not_depend_on_its_start(law, na
     # The range of a posterior includes ten standard deviations.
     sd = float(one.to_coordinate(usual / 15))
     assert one.range_about(u, sd)[1] >= u + 10 * sd
+
+
+@pytest.mark.parametrize("name", ["lambda", "A"])
+def test_the_range_of_a_posterior_holds_an_estimate_that_contradicts_its_prior(name):
+    """Twenty standard deviations of the prior away."""
+    prior = {name: Prior(1e-6, 5e-8, "")}
+    (one,) = unknowns_of(get_law("elasto-plastic"), [name], start={}, priors=prior)
+    u = float(one.to_coordinate(2e-6))
+    low, high = one.range_about(u, 0.01)
+    assert low < u - 0.09
+    assert high > u + 0.09
+    assert low <= one.to_coordinate(6e-7)
 
 
 def test_a_bound_of_a_delay_shifts_no_other_estimate():

@@ -127,7 +127,7 @@ def objective_of(
         if some and len(some) < len(data):
             advice = "fit them one after the other, with the first as the prior of the second"
             raise InputError("data", f"be {what} alone or other data", "both", advice)
-    called = [cycle.name for cycle in cycles] + [run.name for run in recordings]
+    called = [d.name for d in data if isinstance(d, AveragedCycle | RecordedRun)]
     rule, advice = "have different names", "give names, or each file once"
     require(len({*called}) == len(called), "recordings", rule, ", ".join(called), advice)
     names = list(free)
