@@ -13,7 +13,7 @@ from asperity.errors import InputError
 from asperity.laws import RiceRuina
 from asperity.orbit import KnownOrbits, Outcome, response_function
 from asperity.orbit.gradient import search as direct
-from asperity.orbit.methods.settled import settled_orbits
+from asperity.orbit.methods.from_transient import settled_orbits
 from asperity.slider.problem import checked_problem, flatten
 
 #: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast

@@ -25,8 +25,8 @@ from asperity.orbit.methods.branch_following import BranchFollowing
 from asperity.orbit.methods.collocation import Collocation
 from asperity.orbit.methods.fourier import Fourier
 from asperity.orbit.methods.frequency_path import FrequencyPath
+from asperity.orbit.methods.from_transient import SettledMotion
 from asperity.orbit.methods.series import FourierSeries
-from asperity.orbit.methods.settled import SettledMotion
 from asperity.orbit.methods.shooting import Shooting
 from asperity.orbit.outcome import (
     LARGEST_GROWTH,

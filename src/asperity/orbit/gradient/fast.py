@@ -21,7 +21,6 @@ from asperity.algebra.mirrored_grid import grid
 from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
-from asperity.orbit.methods.balance import BalanceEquations
 from asperity.orbit.methods.fourier import (
     LARGEST_CONTRACTING_RATE,
     LoadCycle,
@@ -36,6 +35,7 @@ from asperity.orbit.methods.fourier import (
     rates_on,
     together,
 )
+from asperity.orbit.methods.inertial_fourier import BalanceEquations
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
 from asperity.orbit.steady_sliding import steady_sliding_of
 from asperity.slider import QuasiStatic

@@ -13,7 +13,7 @@ control: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equa
 (Springer, 1993), section II.5. The derivatives at the end of the period are the monodromy matrix.
 
 The initial guess is the averaged limit of a slider that swings on its asperities, as that of
-`asperity.orbit.methods.balance`, with a mean relaxation by slip.
+`asperity.orbit.methods.inertial_fourier`, with a mean relaxation by slip.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from asperity.loads import Excitation
 from asperity.orbit.batches import points_of, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
-from asperity.orbit.methods.balance import sticking_joint
+from asperity.orbit.methods.inertial_fourier import sticking_joint
 from asperity.orbit.observables import Observables, response_gap, waveform_of
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
