@@ -197,3 +197,14 @@ def test_bad_input_is_refused(case):
     chosen = slider(name, numbers_of(name, DRIVES[name][0]))
     with pytest.raises(InputError, match="epsilon must be at least 0 and below 1"):
         sensitivities(chosen, velocity=1e-6, epsilon=1.0, frequency=120.0)
+
+
+@pytest.mark.long  # compiles equations of rigid asperities
+def test_rigid_asperities_with_damping_say_nothing_of_lambda():
+    """Their equations are not those of the limit lambda = 0, where the mean has a slope."""
+    rigid = slider("elasto-plastic", BASE | MACHINE | {"lambda_": 0.0})
+    drive = {"velocity": 1e-6, "frequency": 120.0, "epsilon": 0.24}
+    damped = sensitivities(rigid, **drive, radiation_damping=10.0)
+    unknown = np.array(damped.parameters) == "lambda"
+    assert np.isnan(damped.mean_friction[unknown]).all()
+    assert np.isfinite(damped.mean_friction[~unknown]).all()

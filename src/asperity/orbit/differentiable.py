@@ -42,7 +42,7 @@ from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, growth_o
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import Slider
+from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import checked_problem, flatten, motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
@@ -543,7 +543,8 @@ class Sensitivities:
     converged : bool array, shape (...)
         False where there is no resolved orbit; the derivatives are NaN there.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
-        d(output)/d(parameter) in SI; phases in rad.
+        d(output)/d(parameter) in SI; phases in rad. NaN to lambda at lambda = 0 with inertia or
+        radiation damping: the equations of rigid asperities do not have it.
     log_multipliers : complex array, shape (..., states, parameters)
         Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
         with the positive argument comes first.
@@ -626,6 +627,10 @@ def sensitivities(
     values, derivatives = jax.tree.map(lambda *parts: np.concatenate(parts), *blocks)
     columns = [_outputs(values, derivatives[name]) for name in model.parameters]
     table = np.stack(columns, axis=-1).reshape(*shape, -1, len(columns))
+    rigid = not (isinstance(problem.system, QuasiStatic) or "friction" in problem.system.mechanical)
+    if rigid and "lambda" in model.parameters:
+        # Rigid asperities have other equations with inertia or damping, without lambda.
+        table[..., model.parameters.index("lambda")] = np.nan
     return Sensitivities(
         model.parameters,
         values.outcome.reshape(shape),
