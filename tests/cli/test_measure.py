@@ -249,6 +249,10 @@ def test_a_constant_load_is_told_what_to_do(asperity, tmp_path) -> None:
     assert result.stderr.partition("; --stick-slip reads")[0].endswith("--steps and --velocities")
     result = asperity("measure", path, "-f", "3 Hz", "--velocities", "1 um/s")
     assert "--velocities must be one more than the steps, got 1 for 0" in result.stderr
+    # Sorted times would belong to other velocities.
+    unsorted = ("--steps", "0.4,0.2", "--velocities", "1 um/s,10 um/s,3 um/s")
+    result = asperity("measure", path, *unsorted)
+    assert "--steps must rise where velocities are given, got 0.4, 0.2" in result.stderr
     path.write_text("time (s),W,mu\n" + "\n".join(rows))
     assert asperity("measure", path).stderr == asperity("measure", path, "--unit", "W=N").stderr
 

@@ -154,7 +154,7 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: Annotated[Times, AfterValidator(lambda times: tuple(sorted(times)))] | None = None
+    steps: Times | None = None
     velocities: Velocities | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: StrictBool | None = None
@@ -195,6 +195,9 @@ class Measurement(Question):
             rule, counted = "be one more than the steps", len(self.steps or ()) + 1
             given = self.steps is not None and len(self.velocities) == counted
             require(given, "measure.velocities", rule, got, "give both")
+            steps = self.steps or ()
+            rule, got = "rise where velocities are given", ", ".join(f"{t:g}" for t in steps)
+            require(steps == tuple(sorted(steps)), "measure.steps", rule, got, "sort both")
             rule, got = f"go without {Argument('measure.holds')}", "both"
             advice = "write 0 as the velocity of a hold"
             require(self.holds is None, "measure.velocities", rule, got, advice)
