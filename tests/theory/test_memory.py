@@ -51,6 +51,11 @@ def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
     assert memory.critical_stiffness(loaded, 3e-12) == pytest.approx((B - A) / D0, rel=1e-8)
 
 
+def test_several_interfaces_are_refused_in_one_sentence():
+    with pytest.raises(InputError, match=r"law\.A must be one number, got an array"):
+        memory.critical_stiffness(law("rice-ruina", A=np.array([0.008, 0.01])), V0)
+
+
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_no_spring_stabilises_sliding_on_soft_asperities(share):
     """Spring and asperities in series, with the age on the plastic velocity: k below 1/lambda."""

@@ -114,7 +114,11 @@ def map(
     output.answer(lambda: record, lambda: table, point.law, "")
     output.draw(lambda: _figure(result, show or _SHOWN))
     unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
+    missing = record["boundary_not_found"]
     say(
+        missing
+        and f"stability changes at {count_text(missing, 'place')} of the grid where no boundary "
+        f"was located; the variable 'boundary_result' of {out} says why",
         unresolved
         and f"the boundary bends too much for the grid at {count_text(unresolved, 'place')}, where "
         "it is not known to 1e-4; refine the grid",

@@ -31,9 +31,10 @@ from asperity.algebra.small_systems import spectral_abscissa
 from asperity.arrays import Complex, Float
 from asperity.errors import require
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
-from asperity.parameters import obeying
+from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, QuasiStatic, Slider
+from asperity.slider.problem import require_even_track
 
 #: Stiffnesses of the stability scan: decades below and above those at which the spring is as fast
 #: as the slowest and the fastest state, and number of points.
@@ -58,7 +59,16 @@ def decay_rates(law: Law, velocity: float | str) -> Complex:
     array, shape (states,)
         Eigenvalues of -d(state rate)/d(state) over the velocity, by rising real part: 1/D0 of the
         three laws above.
+
+    Raises
+    ------
+    InputError
+        If a parameter of the law is an array, or mu0 varies along a track.
     """
+    for name, parameter in law_parameters(type(law)).items():
+        value = getattr(law, parameter.path.rsplit(".", 1)[-1])
+        number(value, f"law.{name}", parameter.kind, parameter.rule)
+    require_even_track(law, "a decay of its states")
     V = jnp.asarray(number(velocity, "decay_rates.velocity", "velocity", "positive"))
     one = jnp.ones(())
 
