@@ -58,6 +58,9 @@ def test_a_single_point_is_a_cycle_of_the_harmonic_sum() -> None:
         for n, c in enumerate(response.harmonics, 1)
     )
     np.testing.assert_allclose(force, expected, rtol=1e-12)
+    # Steady sliding has no harmonics, and no logarithms of them.
+    steady = dataclasses.replace(response, harmonics=0 * response.harmonics)
+    assert steady.plot().axes[1].get_yscale() == "linear"
 
 
 def test_a_notebook_shows_the_picture_without_pyplot() -> None:

@@ -111,7 +111,7 @@ def test_rows_that_differ_by_the_noise_of_a_measured_setting_are_one_series():
     assert series == [("1 µm/s", slow), ("10 µm/s", fast)]
     settings["W0"] = np.array([3.0, 7.0, 3.0, 3.0]) + noise
     labels = [label for label, _ in bands._series(settings)]
-    assert labels == ["1 µm/s, W0 = 3", "1 µm/s, W0 = 7", "10 µm/s, W0 = 3"]
+    assert labels == ["1 µm/s, W0 = 3 N", "1 µm/s, W0 = 7 N", "10 µm/s, W0 = 3 N"]
 
 
 def test_residuals_are_data_less_the_law_at_the_rows_of_the_file():

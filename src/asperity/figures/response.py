@@ -138,7 +138,9 @@ def _cycle(response: PeriodicResponse) -> Figure:
     load.plot(theta / (2 * np.pi), w, color=GREY, linestyle="dotted")
     load.set_ylabel("$W/W_0$ (dotted)", color=GREY)
     spectrum.bar(order, np.abs(harmonics), width=0.6, color=RICE_RUINA)
-    spectrum.set(xlabel="harmonic", ylabel="amplitude of $F/W_0$", yscale="log", xticks=order)
+    spectrum.set(xlabel="harmonic", ylabel="amplitude of $F/W_0$", xticks=order)
+    if harmonics.any():  # none without modulation
+        spectrum.set_yscale("log")
     spectrum.minorticks_off()
     point = ", ".join(
         f"{name} {format_si(float(np.asarray(value).item()), kind)}"

@@ -11,6 +11,8 @@ from asperity.arrays import Bool, Float
 from asperity.inference import Fit, LockInTable, Posterior
 from asperity.inference.tables.term import LockInTerm
 from asperity.orbit import Outcome
+from asperity.parameters import MACHINE
+from asperity.units import format_si
 
 #: Number of amplitudes of a curve, and of parameter sets of a band.
 _AMPLITUDES, _SETS = 24, 100
@@ -111,7 +113,10 @@ def _series(settings: Mapping[str, Float]) -> list[tuple[str, Bool]]:
 def _label(name: str, value: float) -> str:
     if name == "V":
         return f"{value * 1e6:.3g} µm/s"
-    return f"{value:.3g} Hz" if name == "frequency" else f"{name} = {value:.3g}"
+    if name == "frequency":
+        return f"{value:.3g} Hz"
+    text = format_si(value, MACHINE[name].kind, 3) if name in MACHINE else f"{value:.3g}"
+    return f"{name} = {text}"
 
 
 def _band(epsilon: Float, values: Float) -> Band:

@@ -169,12 +169,12 @@ class PeriodicResponse(Drawn):
 
     @property
     def phase1(self) -> Float:
-        """Phase of the first harmonic against cos wt (rad); round-off without modulation."""
+        """Phase of the first harmonic against cos wt (rad); no meaning at epsilon 0."""
         return np.angle(self.harmonics[..., 0])
 
     @property
     def phase2(self) -> Float:
-        """Phase of the second harmonic against cos 2wt (rad); round-off without modulation."""
+        """Phase of the second harmonic against cos 2wt (rad); no meaning at epsilon 0."""
         return np.angle(self.harmonics[..., 1])
 
     @property
