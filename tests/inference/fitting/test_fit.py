@@ -376,7 +376,7 @@ def test_predictions_of_two_tables_take_the_load_of_their_rows(readings, pmma):
     ]
     assert "tell them apart best" in what_would_tell(*laws)
     series = bands_of(laws[0], laws[0].objective.terms[0], None)
-    assert [one.label for one in series] == ["10 µm/s, W0 = 5", "10 µm/s, W0 = 7"]
+    assert [one.label for one in series] == ["10 µm/s, W0 = 5 N", "10 µm/s, W0 = 7 N"]
 
 
 def test_a_prior_holds_an_estimate_against_other_fixed_numbers(readings, pmma):
