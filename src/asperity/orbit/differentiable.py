@@ -42,7 +42,7 @@ from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, growth_o
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import QuasiStatic, Slider
+from asperity.slider import Slider
 from asperity.slider.problem import checked_problem, flatten, motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
@@ -627,9 +627,7 @@ def sensitivities(
     values, derivatives = jax.tree.map(lambda *parts: np.concatenate(parts), *blocks)
     columns = [_outputs(values, derivatives[name]) for name in model.parameters]
     table = np.stack(columns, axis=-1).reshape(*shape, -1, len(columns))
-    rigid = not (isinstance(problem.system, QuasiStatic) or "friction" in problem.system.mechanical)
-    if rigid and "lambda" in model.parameters:
-        # Rigid asperities have other equations with inertia or damping, without lambda.
+    if "lambda" in model.parameters and not problem.system.has_elastic_asperities:
         table[..., model.parameters.index("lambda")] = np.nan
     return Sensitivities(
         model.parameters,

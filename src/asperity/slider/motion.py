@@ -56,6 +56,11 @@ class Motion(eqx.Module):
         return len(self.mechanical) + len(self.slider.law.state_names)
 
     @property
+    def has_elastic_asperities(self) -> bool:
+        """Whether lambda is in the equations; with inertia or damping rigid asperities lack it."""
+        return not {"elongation", "friction"}.isdisjoint(self.mechanical)
+
+    @property
     def damping(self) -> ArrayLike:
         """Force of radiation damping at the pulling velocity, over W0."""
         return 0.0

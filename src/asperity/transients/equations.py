@@ -150,8 +150,9 @@ def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     motion, at, states = system.motion, system.at(t), Y[:-1]
     velocity = motion.slider_velocity(states, at)
     friction = system.friction(at, states)
-    elastic = isinstance(motion, QuasiStatic) or "friction" in motion.mechanical
-    slip = motion.slip_velocity(friction, states, at) if elastic else velocity
+    slip = velocity
+    if motion.has_elastic_asperities:
+        slip = motion.slip_velocity(friction, states, at)
     pull = jnp.where(at.pull != 0, at.pull, jnp.nan)
     change = jnp.abs(motion.rates(states, at) / (motion.kappa * pull)).max(0)
     unsteadiness = jnp.maximum(change, jnp.abs(velocity / pull - 1))
