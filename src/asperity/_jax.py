@@ -144,6 +144,9 @@ def configure() -> Path | None:
     jax.config.update("jax_enable_x64", True)
     if not any(getattr(jax.config, name) for name in ("jax_platforms", "jax_default_device")):
         jax.config.update("jax_default_device", "cpu")
+    # Results are read as soon as they are computed: a second thread for programs of a millisecond
+    # only adds its waking up, a twelfth of the time of a fit.
+    jax.config.update("jax_cpu_enable_async_dispatch", False)
     jax.monitoring.register_event_duration_secs_listener(_count)
     folder = _cache_folder()
     if folder is None or not _writable(folder):
