@@ -71,8 +71,10 @@ def contracted(
         _, left, _, rounds = carry
         return (rounds < _ROUNDS) & jnp.any((left > 0) & (left < jnp.inf))
 
-    size = largest(right)
-    start = (right, jnp.full_like(size, jnp.nan), size, 0)
+    first = jax.tree.leaves(right)[0]
+    # Not the size of the right-hand side, which may be a constant: XLA takes seconds to fold it.
+    far = jnp.full(first.shape[0] if points_first else first.shape[-1], jnp.inf)
+    start = (right, far, far, 0)
     new, left, _, _ = jax.lax.while_loop(unfinished, take_round, take_round(start))
 
     def kept(y: Array) -> Array:
