@@ -7,6 +7,10 @@ from scipy.optimize import fsolve
 import asperity as asp
 from asperity.branches.parameters import one_problem
 from asperity.errors import InputError
+from asperity.loads import Harmonic
+from asperity.orbit.methods.branch_following import MESHES, follow_from_steady_sliding
+from asperity.slider import equation_of_motion
+from asperity.slider.problem import Problem, flatten
 from references.populations import population
 
 #: Location of bifurcations, relative: what is promised.
@@ -75,6 +79,17 @@ def test_folds_agree_with_shooting(hysteresis, resonance):
         assert flag in (1, 4, 5)  # 4, 5: no progress beyond round-off
         assert np.abs(defect(at_fold)).max() < 1e-9
         assert fold.value == pytest.approx(at_fold[2], rel=LOCATION)
+
+
+def test_the_search_folds_where_the_continuation_does(hysteresis, resonance):
+    # The branch folds at an epsilon far below the one asked for.
+    omega = 2 * np.pi * np.array([resonance.frequency])
+    motion = equation_of_motion(resonance.slider, np.array([resonance.V]), omega)
+    problem, _ = flatten(Problem(motion, Harmonic(np.array([0.01]))))
+    followed = follow_from_steady_sliding(problem, MESHES[0])
+    assert followed.arrived[0]
+    # Estimated between two neighbouring points.
+    assert followed.fold[0] * 0.01 == pytest.approx(hysteresis.bifurcations[0].value, rel=5e-3)
 
 
 def test_period_doubling_agrees_with_shooting(hysteresis, resonance):

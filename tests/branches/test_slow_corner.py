@@ -1,22 +1,13 @@
 """Slow modulation: branches through folds and canards, and the reasons why branches end."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.loads import Harmonic
 from asperity.orbit import Outcome
-from asperity.orbit.methods.branch_following import (
-    MESHES,
-    BranchFollowing,
-    BranchMesh,
-    follow_from_steady_sliding,
-)
+from asperity.orbit.methods.branch_following import BranchFollowing, BranchMesh
 from asperity.orbit.solution import SearchOptions
-from asperity.slider import equation_of_motion
-from asperity.slider.problem import Problem, checked_problem, flatten
+from asperity.slider.problem import checked_problem, flatten
 from references.populations import population
 
 pytestmark = pytest.mark.slow
@@ -67,7 +58,7 @@ def test_an_orbit_at_the_end_of_a_canard_obeys_the_equations(solve, reference):
     assert (error <= 1e-6 * np.abs(shot.harmonics)).all()
 
 
-# `orbit/test_periodic.py` has another runaway, the last test of this file a fold, and
+# `orbit/test_periodic.py` has another runaway, `test_bifurcations.py` a fold, and
 # `orbit/test_search.py` what the last one, which takes a minute, is called.
 @pytest.mark.parametrize("name", population(list(CORNER)[1:], short=0))
 def test_a_branch_that_does_not_arrive_has_a_reason(solve, name):
@@ -98,17 +89,3 @@ def test_slip_does_not_run_away_beyond_what_radiation_damping_permits(shooting):
     method = BranchFollowing((BranchMesh(72, 100),))
     solution = method.solve(problem, SearchOptions(2, 0))
     assert solution.outcome.tolist() == [outcome, Outcome.NO_ORBIT]
-
-
-def test_folds_of_the_amplitude_are_those_of_the_continuation(shooting):
-    # Nonlinear resonance: the branch folds at an epsilon far below the one asked for.
-    p = dataclasses.replace(shooting(K=1.05 * shooting(K=1.0).Kc), frequency=0.37)
-    motion = equation_of_motion(p.slider, np.array([p.V]), 2 * np.pi * np.array([p.frequency]))
-    problem, _ = flatten(Problem(motion, Harmonic(np.array([0.01]))))
-    followed = follow_from_steady_sliding(problem, MESHES[0])
-    assert followed.arrived[0]
-    branch = asp.continuation(
-        p.slider, parameter="epsilon", span=(0, 0.01), velocity=p.V, frequency=p.frequency
-    )
-    # Estimated between two neighbouring points.
-    assert followed.fold[0] * 0.01 == pytest.approx(branch.bifurcations[0].value, rel=5e-3)
