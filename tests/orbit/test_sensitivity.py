@@ -20,15 +20,11 @@ MACHINE = {"K": 2e5, "W0": 7.0, "M": 1.6}
 #: A law with asperities: derivatives of every law, and multipliers of two states without
 #: asperities, are in `test_response_function`.
 LAWS = {"elasto-plastic": (ElastoPlastic, BASE | {"lambda_": 7e-7})}
-#: V, frequency, epsilon: a complex pair of multipliers, a real one; a negative one, at an orbit
-#: that only the search finds.
-DRIVES = {"elasto-plastic": [(1e-6, 120.0, 0.24), (1e-5, 120.0, 0.5), (1e-6, 0.4, 0.24)]}
-#: The derivatives of an orbit of the search by two parameters are in `test_response_function`.
-CASES = [
-    pytest.param(law, row, marks=pytest.mark.long if row == 2 else ())
-    for law, drives in DRIVES.items()
-    for row in range(len(drives))
-]
+#: V, frequency, epsilon: a complex pair of multipliers, and a real one.
+DRIVES = {"elasto-plastic": [(1e-6, 120.0, 0.24), (1e-5, 120.0, 0.5)]}
+#: A negative one, at an orbit that only the search finds. The derivatives of an orbit of the search
+#: by two parameters are in `test_response_function`.
+SEARCHED = (1e-6, 0.4, 0.24)
 SCALARS = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
 STEP = 4e-3
 
@@ -81,14 +77,17 @@ def differences(name, drive):
 @pytest.fixture(scope="module", params=LAWS)
 def case(request):
     """Sensitivities at all drives of a law, and its name."""
-    numbers = numbers_of(request.param, np.transpose(DRIVES[request.param]))
-    result = sensitivities(
-        slider(request.param, numbers),
+    return request.param, sensitivities_at(request.param, DRIVES[request.param])
+
+
+def sensitivities_at(name, drives):
+    numbers = numbers_of(name, np.transpose(drives))
+    return sensitivities(
+        slider(name, numbers),
         velocity=numbers["V"],
         epsilon=numbers["epsilon"],
         frequency=numbers["frequency"],
     )
-    return request.param, result
 
 
 def test_derivatives_have_the_names_and_shapes_of_the_parameters(case):
@@ -101,11 +100,20 @@ def test_derivatives_have_the_names_and_shapes_of_the_parameters(case):
     assert result.log_multipliers.shape == (count, 2, len(expected))
 
 
-@pytest.mark.parametrize(("case", "row"), CASES, indirect=["case"])
-def test_every_derivative_agrees_with_differences(case, row):
+def test_every_derivative_agrees_with_differences(case):
     name, result = case
-    numbers = numbers_of(name, DRIVES[name][row])
-    expected = differences(name, DRIVES[name][row])
+    for row, drive in enumerate(DRIVES[name]):
+        check_differences(name, drive, result, row)
+
+
+@pytest.mark.long
+def test_every_derivative_at_an_orbit_of_the_search_agrees_with_differences():
+    name = "elasto-plastic"
+    check_differences(name, SEARCHED, sensitivities_at(name, [SEARCHED]), 0)
+
+
+def check_differences(name, drive, result, row):
+    numbers, expected = numbers_of(name, drive), differences(name, drive)
     scalars = np.stack([getattr(result, output)[row] for output in SCALARS], axis=1)
     computed = np.concatenate([scalars, result.log_multipliers[row].T], axis=1)
     order = [result.parameters.index(key.rstrip("_")) for key in numbers]
