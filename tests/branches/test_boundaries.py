@@ -74,6 +74,7 @@ def test_the_boundary_inside_the_rectangle_agrees_with_shooting(stiffness, slow)
         assert abs(growth / ((change - growth) / 1e-3)) < BOUNDARY
 
 
+@pytest.mark.long
 def test_period_doubling_boundaries_agree_with_shooting(slow):
     boundary = asp.stability_boundary(
         slow.slider,

@@ -15,6 +15,7 @@ from asperity.orbit.floquet import (
     sorted_logs,
     without_lost_arguments,
 )
+from references.populations import population
 
 #: Round-off of logarithms.
 EXACT = 1e-13
@@ -161,7 +162,7 @@ def test_the_product_of_the_multipliers_obeys_liouvilles_formula(
     assert response.log_multipliers.real.sum() == pytest.approx(expected, rel=LIOUVILLE)
 
 
-@pytest.mark.parametrize("law", [RiceRuina, RuinaSlip])
+@pytest.mark.parametrize("law", population([RiceRuina, RuinaSlip]))
 def test_no_exponent_where_the_change_of_variables_is_singular(law):
     # A stiff spring, on which the force decays within a radian. Averaging reaches an exponent of
     # another system here, for some amplitudes an unstable one.
@@ -184,7 +185,7 @@ def test_multipliers_of_small_modulation_are_those_of_steady_sliding(method):
         velocity=V,
         epsilon=[0.0, 1e-4],
         frequency=V / (2 * np.pi * nu * D0),
-        waveform=SAMPLES,
+        waveform=1,
         methods=(method,),
     )
     assert response.converged.all()
@@ -234,7 +235,7 @@ def test_the_threshold_amplitude_agrees_with_shooting(reference):
 
     def respond(epsilon):
         return periodic_response(
-            slider, velocity=1e-6, epsilon=epsilon, frequency=120.0, waveform=SAMPLES
+            slider, velocity=1e-6, epsilon=epsilon, frequency=120.0, waveform=16
         )
 
     threshold = brentq(lambda e: float(respond(e).floquet_max) - 1, 0.1, 0.15, xtol=1e-10)
@@ -244,7 +245,7 @@ def test_the_threshold_amplitude_agrees_with_shooting(reference):
     shot = reference.multiple_shooting(
         reference.Printed(),
         sides.epsilon[:, None],
-        *sides.waveform[..., :: SAMPLES // 16],
+        *sides.waveform,
     )
     assert np.abs(shot.multipliers[1, 0]) == pytest.approx(1, abs=1e-10)
     assert np.abs(shot.multipliers[0, 0]) > 1 > np.abs(shot.multipliers[2, 0])

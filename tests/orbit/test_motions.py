@@ -184,8 +184,8 @@ def first_states(case, start):
     return np.array([elongation, start[1] + np.log(case.V), start[2]])
 
 
-# The last one repeats the stiff one, of which SciPy's implicit method takes longest.
-@pytest.fixture(scope="module", params=population(CASES, short=len(CASES) - 1))
+# The last ones repeat the stiff one, of which SciPy's implicit method takes longest, and the load.
+@pytest.fixture(scope="module", params=population(CASES, short=len(CASES) - 2))
 def integrated(request):
     """A case, its response, and SciPy's solution over a period from the same start."""
     case = CASES[request.param]

@@ -9,6 +9,7 @@ import pytest
 from asperity import Slider, periodic_response
 from asperity.laws import ElastoPlastic, LinkerDieterich, RiceRuina
 from asperity.slider import QuasiStatic
+from references.populations import population
 
 #: What a converged point promises, relative.
 PROMISED = 1e-8
@@ -17,8 +18,7 @@ BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 LAMBDA, ALPHA = 7e-7, 0.2
 K, W0, V, FREQUENCY = 2e5, 7.0, 1e-6, 120.0
 EPSILON = np.array([0.02, 0.1])
-#: As in `test_periodic`.
-SAMPLES = 4096
+#: Samples of the waveform, at which the integration is cut into segments.
 SEGMENTS = 32
 VARIANTS = {
     RiceRuina: {},
@@ -63,13 +63,17 @@ class NoElasticAgeing(ElastoPlastic):
         return (self.ageing(v_plastic, state, w),)
 
 
-MISTAKEN = [
-    (LinkerDieterich, ForgottenLoadRate),
-    (LinkerDieterich, OtherLinkerDieterich),
-    (ElastoPlastic, StiffeningAsperities),
-    (ElastoPlastic, NoElasticAgeing),
-    (RiceRuina, ConstantLoad),
-]
+#: In every run one in a law; another one is planted in the equation of motion.
+MISTAKEN = population(
+    [
+        (LinkerDieterich, ForgottenLoadRate),
+        (LinkerDieterich, OtherLinkerDieterich),
+        (ElastoPlastic, StiffeningAsperities),
+        (ElastoPlastic, NoElasticAgeing),
+        (RiceRuina, ConstantLoad),
+    ],
+    several=True,
+)
 
 
 def solve(law):
@@ -80,7 +84,7 @@ def solve(law):
         velocity=V,
         epsilon=EPSILON,
         frequency=FREQUENCY,
-        waveform=SAMPLES,
+        waveform=SEGMENTS,
         methods=("fourier",),
     )
 
@@ -97,9 +101,7 @@ def truth(reference):
     def both(law):
         response = solve(law)
         printed = reference.Printed(V=V, frequency=FREQUENCY, **VARIANTS[law])
-        return response, reference.multiple_shooting(
-            printed, EPSILON[:, None], *response.waveform[..., :: SAMPLES // SEGMENTS]
-        )
+        return response, reference.multiple_shooting(printed, EPSILON[:, None], *response.waveform)
 
     return {law: both(law) for law in VARIANTS}
 

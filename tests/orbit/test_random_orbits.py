@@ -60,7 +60,7 @@ def ageing_over_lengths(count):
     return Lengths
 
 
-@pytest.mark.parametrize("states", [1, 2, 3, 5])
+@pytest.mark.parametrize("states", population([1, 2, 5, 3], short=3))
 def test_laws_of_any_number_of_states_have_the_orbits_of_scipy(states):
     """Compared with a separate implementation, in the spring's elongation and the law's states."""
     lengths, epsilon = np.arange(1, states), 0.2
@@ -104,8 +104,8 @@ OTHERS = {
     "prakash-clifton": {"L": "0.3 um", "V_star": "0.1 um/s"},
 }
 LAWS = sorted(name for name, law in registered().items() if law.rate_dependent)
-#: In every run: laws of one and of two states, with elastic asperities, and one that may rest.
-SUITE = ("cut-off", "elasto-plastic", "prakash-clifton", "two-state")
+#: In every run: a law of two states, and one that may rest.
+SUITE = ("cut-off", "prakash-clifton")
 EQUATIONS = (
     {},
     {"inertia": True},

@@ -16,7 +16,7 @@ MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0
 Kc = (B - A) * W0 / D0
 V = 1e-5
 #: Samples of a waveform.
-SAMPLES = 4096
+SAMPLES = 128
 MU = MU0 - (B - A) * np.log(V / V0)
 #: Relative accuracy of harmonics 1 and 2 that every method promises.
 PROMISED = 1e-9
