@@ -11,6 +11,7 @@ from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, LinkerDieterich, RiceRuina
 from asperity.theory import closed_forms as cf
 from asperity.theory.ageing_response import ageing_response
+from references.populations import population
 
 #: mu = 0.5 at V = V0, and the paper's A, B, D0, K, W0, f.
 CENTRAL = {
@@ -34,15 +35,18 @@ def central(V=1e-6, **changes):
 
 @pytest.mark.parametrize(
     "case",
-    [
-        {"V": 1e-6},
-        {"V": 1e-5, "frequency": 5.0},
-        {"V": 1e-5, "frequency": 20.0, "alpha": 0.2},
-        {"V": 1e-5, "lambda_": 7e-7},
-        {"V": 1e-5, "M": 1.6},
-        {"V": 1e-5, "M": 1.6, "lambda_": 7e-7},
-        {"V": 1e-5, "M": 1.6, "lambda_": 7e-7, "alpha": 0.1, "ageing": "plastic"},
-    ],
+    population(
+        [
+            {"V": 1e-6},
+            {"V": 1e-5, "frequency": 20.0, "alpha": 0.2},
+            {"V": 1e-5, "lambda_": 7e-7},
+            {"V": 1e-5, "M": 1.6, "lambda_": 7e-7, "alpha": 0.1, "ageing": "plastic"},
+            {"V": 1e-5, "frequency": 5.0},
+            {"V": 1e-5, "M": 1.6},
+            {"V": 1e-5, "M": 1.6, "lambda_": 7e-7},
+        ],
+        short=4,
+    ),
     ids=str,
 )
 def test_exact_response_equals_an_integration(reference, case):
