@@ -509,7 +509,7 @@ def _differentiate(
 
     names = program.equations.names
     points = parameters[names[0]].shape[0]
-    count = jax.eval_shape(evaluate, parameters)[0].shape[1]
+    count = program.columns
     if count < len(names):
         _, pull, values = jax.vjp(evaluate, parameters, has_aux=True)
         unit = jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count))

@@ -284,16 +284,12 @@ def searched_values(parameters: Parameters, wanted: Array, program: Program) -> 
     return ResponseValues.of_columns(columns, outcome, program.harmonics)
 
 
-def _count(program: Program) -> int:
-    return 1 + 2 * program.harmonics + 2 * program.states * program.multipliers
-
-
 def _searched_response(
     program: Program, parameters: Any, wanted: Array, *, derivatives: bool
 ) -> tuple[Array, Array, Array]:
     """`_response` as a compiled program calls it, if any point is wanted."""
     (points,), names = wanted.shape, program.equations.names
-    count = _count(program)
+    count = program.columns
     shapes = (
         jax.ShapeDtypeStruct((points, count), np.dtype(float)),
         jax.ShapeDtypeStruct((points,), np.dtype(np.int64)),
@@ -324,7 +320,7 @@ def _response(
 
     The derivatives are of shape (parameters, points, count), without parameters if not requested.
     """
-    equations, points, count = program.equations, len(wanted), _count(program)
+    equations, points, count = program.equations, len(wanted), program.columns
     orbits = search_orbits(equations, program.harmonics, parameters, wanted)
     columns = np.zeros((points, count))
     table = np.zeros((len(equations.names) * derivatives, points, count))

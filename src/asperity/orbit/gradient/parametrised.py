@@ -231,6 +231,11 @@ class Program(NamedTuple):
         return len(self.equations.motion.mechanical) + len(self.equations.law.state_names)
 
     @property
+    def columns(self) -> int:
+        """Number of real columns of the response, as in `ResponseValues.columns`."""
+        return 1 + 2 * self.harmonics + 2 * self.states * self.multipliers
+
+    @property
     def without_search(self) -> Program:
         """The program without orbits of the search."""
         return self._replace(search=False)
