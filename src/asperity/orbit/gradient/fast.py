@@ -6,7 +6,6 @@ derivatives. The multipliers are functions of the Jacobian along the orbit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -16,20 +15,19 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.algebra.contraction import Equations, contracted, implicit_solution
+from asperity.algebra.contraction import contracted, implicit_solution
 from asperity.algebra.mirrored_grid import grid
 from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.fourier import (
     LARGEST_CONTRACTING_RATE,
-    LoadCycle,
+    GridEquations,
     States,
     advance,
     force_spectrum,
     fourier_orbit,
     jacobian_on,
-    load_cycle,
     orbit_error,
     per_tau,
     rates_on,
@@ -132,22 +130,8 @@ class FourierUnknowns(NamedTuple):
     zero_mean: States
 
 
-@dataclass(frozen=True)
-class FourierEquations(Equations):
-    """Orbit equations on a grid; the parameters are (problem, (), steps that the orbit took).
-
-    Parameters
-    ----------
-    nodes : int
-    grading : float
-    """
-
-    nodes: int
-    grading: float
-
-    def cycle(self, problem: Problem) -> LoadCycle:
-        """The load on the grid."""
-        return load_cycle(problem, self.nodes, self.grading)
+class FourierEquations(GridEquations):
+    """Orbit equations on a grid; the parameters are (problem, (), steps that the orbit took)."""
 
     def orbits(
         self, problem: Problem, harmonics: int

@@ -23,6 +23,7 @@ Mean, harmonics and the logarithm of the monodromy matrix are read on the same g
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -32,6 +33,7 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
+from asperity.algebra.contraction import Equations
 from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
 from asperity.arrays import Float
@@ -121,6 +123,25 @@ def load_cycle(problem: Problem, nodes: int, grading: float) -> LoadCycle:
     shape = (nodes, points_of(problem))
     at = jax.tree.map(lambda a: jnp.broadcast_to(a, shape) if jnp.ndim(a) else a, at)
     return LoadCycle(theta, 1 + grading * np.cos(tau), integral, at)
+
+
+@dataclass(frozen=True)
+class GridEquations(Equations):
+    """Equations of an orbit on the grid theta = tau + g sin(tau).
+
+    Parameters
+    ----------
+    nodes : int
+    grading : float
+        g.
+    """
+
+    nodes: int
+    grading: float
+
+    def cycle(self, problem: Problem) -> LoadCycle:
+        """The load on the grid."""
+        return load_cycle(problem, self.nodes, self.grading)
 
 
 def rates_on(system: QuasiStatic, cycle: LoadCycle) -> Callable[..., States]:

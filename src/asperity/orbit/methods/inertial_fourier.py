@@ -13,7 +13,6 @@ the grid, and advances z and the states of the law as `asperity.orbit.methods.fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, TypeAlias
 
@@ -23,7 +22,6 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.contraction import Equations
 from asperity.algebra.mirrored_grid import grid, interpolation
 from asperity.algebra.small_systems import (
     Matrix,
@@ -34,11 +32,11 @@ from asperity.algebra.small_systems import (
 )
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.fourier import (
+    GridEquations,
     LoadCycle,
     States,
     advance,
     iterated,
-    load_cycle,
     spectrum,
     together,
     truncation,
@@ -105,25 +103,12 @@ class Prepared(NamedTuple):
     mean_inverse: Matrix
 
 
-@dataclass(frozen=True)
-class BalanceEquations(Equations):
+class BalanceEquations(GridEquations):
     """The equations of an orbit on a grid, for the solver and for the implicit-function rule.
 
     The parameters are the problem, the linearisation that the last step of the solver used, and
     the number of steps that linear systems take.
-
-    Parameters
-    ----------
-    nodes : int
-    grading : float
     """
-
-    nodes: int
-    grading: float
-
-    def cycle(self, problem: Problem) -> LoadCycle:
-        """The load on the grid."""
-        return load_cycle(problem, self.nodes, self.grading)
 
     def prepare(self, parameters: Parameters, unknowns: BalanceUnknowns) -> tuple[Prepared, Array]:
         """Prepared arrays of the solver, and its steps."""
