@@ -332,9 +332,12 @@ def _iterate(
         new, change = equations.bounded_step(problem, cycle, unknowns, at)
         return (new, at), change
 
-    shapes = jax.eval_shape(prepare, start)
-    nothing = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
-    points = start.friction.shape[1]
+    # By hand: JAX would trace the linearisation once more for its shapes.
+    (nodes, points), size = start.friction.shape, len(start.mean)
+    none, row = jnp.zeros((nodes, points)), [jnp.zeros(points)] * size
+    nothing = Prepared(
+        jnp.zeros((nodes, nodes, points)), (none,) * size, [[none] * size] * size, [row] * size
+    )
     state, error, steps = iterated(
         step, (start, nothing), points, tolerance, _ROUND_OFF, _MOST_STEPS
     )
