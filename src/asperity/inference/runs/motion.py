@@ -153,7 +153,7 @@ def _read(
     x = free.numbers(given)
 
     def friction(curve: Curve, x: Array) -> Array:
-        return _recorded(motion, drive, free.values(given, x), curve, steps, reading)
+        return ComputedRun.of(motion, drive, free.values(given, x), curve, steps).recorded(reading)
 
     f = friction(curve, x)
     if not len(free.directions):
@@ -165,89 +165,89 @@ def _read(
     return f, jax.vmap(along)(slopes, free.directions)
 
 
-def _recorded(
-    motion: Motion,
-    drive: Drive,
-    values: Mapping[str, Array],
-    curve: Curve,
-    steps: Array,
-    reading: GaugeReading,
-) -> Array:
-    """F/W as the gauge records it."""
-    motion, drive, times = with_values(motion, values), shifted(drive, values), reading.times
-    if reading.means:
-        friction = _averaged(motion, drive, values, curve, steps, times)
-    else:
-        i = _step_of(curve, steps, times)
-        share = (times - curve.begin[i]) / curve.length[i]
-        friction = _friction(motion, drive, values, curve, i, share, times)
-    return values[GAIN] * reading.recorded(friction)
+class ComputedRun(NamedTuple):
+    """A computed motion through a recording, from which friction is read at any time.
 
+    Attributes
+    ----------
+    motion : Motion
+    drive : Drive
+        With its edges delayed.
+    values : mapping of str to array
+    curve : Curve
+    steps : array
+        Number of the integrator's steps.
+    """
 
-def _averaged(
-    motion: Motion,
-    drive: Drive,
-    values: Mapping[str, Array],
-    curve: Curve,
-    steps: Array,
-    edges: Array,
-) -> Array:
-    """Mean F/W between neighbouring edges; 0 between equal edges."""
-    numbers = jnp.arange(curve.begin.size)
-    taken = numbers < steps
-    begin = jnp.where(taken, curve.begin, 0.0)
-    # Means are differences of an integral; integrating small numbers keeps more digits.
-    level = jax.lax.stop_gradient(
-        _friction(motion, drive, values, curve, numbers[:1], jnp.zeros(1), begin[:1])
-    )
+    motion: Motion
+    drive: Drive
+    values: Mapping[str, Array]
+    curve: Curve
+    steps: Array
 
-    def integral(step: Array, share: Array) -> Array:
-        """Integral of F/W from the beginning of a step to a share of its length."""
-        total = jnp.zeros(share.shape)
-        for node, weight in _GAUSS:
-            at = begin[step] + node * share * curve.length[step]
-            f = _friction(motion, drive, values, curve, step, node * share, at)
-            total = total + weight * (f - level)
-        return total * share * curve.length[step]
+    @classmethod
+    def of(
+        cls, motion: Motion, drive: Drive, values: Mapping[str, Array], curve: Curve, steps: Array
+    ) -> ComputedRun:
+        """With the numbers of motion and drive in `values`."""
+        return cls(with_values(motion, values), shifted(drive, values), values, curve, steps)
 
-    whole = jnp.where(taken, integral(numbers, jnp.ones(numbers.size)), 0.0)
-    before = jnp.cumsum(whole) - whole
-    i = _step_of(curve, steps, edges)
-    rise = jnp.diff(before[i] + integral(i, (edges - begin[i]) / curve.length[i]))
-    apart = jnp.diff(edges)
-    return jnp.where(apart > 0, level + rise / jnp.where(apart > 0, apart, 1.0), 0.0)
+    def recorded(self, reading: GaugeReading) -> Array:
+        """F/W as the gauge records it."""
+        times = reading.times
+        if reading.means:
+            friction = self._averaged(times)
+        else:
+            i = self._step_of(times)
+            share = (times - self.curve.begin[i]) / self.curve.length[i]
+            friction = self._friction(i, share, times)
+        return self.values[GAIN] * reading.recorded(friction)
 
+    def _averaged(self, edges: Array) -> Array:
+        """Mean F/W between neighbouring edges; 0 between equal edges."""
+        length = self.curve.length
+        numbers = jnp.arange(length.size)
+        taken = numbers < self.steps
+        begin = jnp.where(taken, self.curve.begin, 0.0)
+        # Means are differences of an integral; integrating small numbers keeps more digits.
+        level = jax.lax.stop_gradient(self._friction(numbers[:1], jnp.zeros(1), begin[:1]))
 
-def _step_of(curve: Curve, steps: Array, times: Array) -> Array:
-    """Index of the integrator's step that contains each time."""
-    begin = jax.lax.stop_gradient(curve.begin)
-    i = jnp.clip(jnp.searchsorted(begin, times, side="right") - 1, 0)
-    return jnp.minimum(i, steps - 1)
+        def integral(step: Array, share: Array) -> Array:
+            """Integral of F/W from the beginning of a step to a share of its length."""
+            total = jnp.zeros(share.shape)
+            for node, weight in _GAUSS:
+                at = begin[step] + node * share * length[step]
+                total = total + weight * (self._friction(step, node * share, at) - level)
+            return total * share * length[step]
 
+        whole = jnp.where(taken, integral(numbers, jnp.ones(numbers.size)), 0.0)
+        before = jnp.cumsum(whole) - whole
+        i = self._step_of(edges)
+        rise = jnp.diff(before[i] + integral(i, (edges - begin[i]) / length[i]))
+        apart = jnp.diff(edges)
+        return jnp.where(apart > 0, level + rise / jnp.where(apart > 0, apart, 1.0), 0.0)
 
-def _friction(
-    motion: Motion,
-    drive: Drive,
-    values: Mapping[str, Array],
-    curve: Curve,
-    step: Array,
-    share: Array,
-    times: Array,
-) -> Array:
-    """F/W at times, each a share of the length of a step after its beginning."""
-    x = share
+    def _step_of(self, times: Array) -> Array:
+        """Index of the integrator's step that contains each time."""
+        begin = jax.lax.stop_gradient(self.curve.begin)
+        i = jnp.clip(jnp.searchsorted(begin, times, side="right") - 1, 0)
+        return jnp.minimum(i, self.steps - 1)
 
-    def state(i: int) -> Array:
-        # State by state: states without influence on the force are then not computed.
-        c = [curve.coefficients[:, j, i][step] for j in range(5)]
-        return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + x * c[4])))
+    def _friction(self, step: Array, share: Array, times: Array) -> Array:
+        """F/W at times, each a share of the length of a step after its beginning."""
+        drive, x = self.drive, share
 
-    y = [state(i) for i in range(curve.coefficients.shape[2])]
-    piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1
-    piece = jnp.clip(piece, 0, drive.pull.shape[0] - 1)
-    at = excitation(drive, values, piece, times)
-    load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])
-    return motion.force(jnp.stack(y), at) / load
+        def state(i: int) -> Array:
+            # State by state: states without influence on the force are then not computed.
+            c = [self.curve.coefficients[:, j, i][step] for j in range(5)]
+            return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + x * c[4])))
+
+        y = [state(i) for i in range(self.curve.coefficients.shape[2])]
+        piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1
+        piece = jnp.clip(piece, 0, drive.pull.shape[0] - 1)
+        at = excitation(drive, self.values, piece, times)
+        load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])
+        return self.motion.force(jnp.stack(y), at) / load
 
 
 class RunArrays(NamedTuple):
@@ -313,8 +313,8 @@ class RunResiduals:
 
             def white(curve: Curve, x: Array) -> Array:
                 values = free.values(given, x)
-                friction = _recorded(motion, data.drive, values, curve, steps, data.reading)
-                departures = friction - data.recorded
+                run = ComputedRun.of(motion, data.drive, values, curve, steps)
+                departures = run.recorded(data.reading) - data.recorded
                 return innovations(departures, data.noise, self.stretches, data.basis, jnp)
 
             result, back = jax.vjp(white, curve, free.numbers(given))
