@@ -88,7 +88,7 @@ def test_intervals_by_blocks_agree_with_those_by_samples(by_blocks, clean, ringi
 
 def test_the_averaging_is_described_in_one_sentence(clean, ringing):
     run = recorded(clean + ringing + mains(np.arange(24_000) / CASE.rate))
-    sentence = RunTerm(cleaned(run), get_law("rice-ruina"), {}).noise["averaged"]
+    sentence = RunTerm(cleaned(run), get_law("rice-ruina"), {}, RunOptions()).noise["averaged"]
     assert sentence.startswith("24000 samples are compared as ")
     assert "means over blocks of" in sentence
     assert "lines at 50" in sentence
@@ -147,7 +147,9 @@ def test_a_wrong_mean_is_left_out_of_wider_blocks_too(clean, ringing):
     k = int(np.searchsorted(run.time, CASE.changes[0])) + 2
     friction = run.friction.copy()
     friction[k] += 1e-3
-    term = RunTerm(replace(run, friction=friction), get_law("rice-ruina"), TRUTH | TRUE)
+    term = RunTerm(
+        replace(run, friction=friction), get_law("rice-ruina"), TRUTH | TRUE, RunOptions()
+    )
     assert term.update_noise({})
     assert term.wrong_samples({}) == (run.time[k],)
     wide = averaged(replace(run, wrong=(run.time[k],)), 0.04)
@@ -207,7 +209,7 @@ def test_a_gauge_filters_the_motion_before_it_is_averaged(clean):
     known = {name: TRUTH[name] for name in ("mu0", "V0")} | TRUE
 
     def largest(gauge):
-        term = RunTerm(run, get_law("rice-ruina"), known, gauge=gauge)
+        term = RunTerm(run, get_law("rice-ruina"), known, RunOptions(gauge=gauge))
         departures = term.departures({}, slopes=False)[0]
         return np.abs(departures - np.median(departures)).max()
 

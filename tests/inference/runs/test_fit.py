@@ -353,7 +353,7 @@ def test_each_sample_left_out_costs_the_largest_departure_of_noise(steps_fit):
         replace(term.run, wrong=(term.run.time[300], term.run.time[900])),
         term.law,
         term.fixed,
-        linear=term.linear,
+        term.options,
         nuisances=term.nuisances,
     )
     without.models = term.models

@@ -8,22 +8,26 @@ the same samples would count twice, and are refused.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, enumerated, require, symbol
-from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import STIFFNESS, RecordedRun
-from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
+from asperity.inference.runs.term import (
+    Linear as Linear,
+    RunOptions as RunOptions,
+    RunTerm,
+    about_zero,
+    cut_delays,
+)
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
-from asperity.parameters.arguments import at_least, number, typed
 
 #: Search range of the stiffness over the load (1/m): deformation apparatus and tribometers.
 USUAL_STIFFNESS = (5e2, 5e4)
@@ -31,45 +35,10 @@ USUAL_STIFFNESS = (5e2, 5e4)
 _SAMPLES_PER_PARAMETER = 8
 #: Names of parameters of an air layer: its gap, the radius of the patch and the pressure.
 _LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
-Linear = Literal["offset", "trend", "bend", "drift"]
 #: Loads that differ by less than this share are one.
 ONE_LOAD = 1e-3
 #: Prior standard deviations of the departures of initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
-
-
-@typed
-@dataclass(frozen=True)
-class RunOptions:
-    """Options of the comparison of recorded runs with the motion.
-
-    Attributes
-    ----------
-    linear : tuple of str
-        Linear nuisances of each run: "offset", "trend" (over slip), "bend" (over the square of the
-        slip) or "drift" (over time).
-    initial : {"steady", "free"}
-        Whether runs begin in steady sliding.
-    gauge : (int, float), optional
-        Order and corner frequency (Hz) of the low-pass of the force gauge.
-    order : int, optional
-        Order of the autoregressive noise; by default the data choose it.
-    fit_rate : float or str, optional
-        Number of block means per second (Hz) that replace the samples, or "full" for every sample.
-        By default recordings of up to 20,000 samples are compared sample by sample, and longer ones
-        by means over blocks that are short enough to resolve their changes.
-    """
-
-    linear: tuple[Linear, ...] = ("offset", "trend")
-    initial: Literal["steady", "free"] = "steady"
-    gauge: tuple[Annotated[int, at_least(1)], float] | None = None
-    order: Annotated[int, at_least(0)] | None = None
-    fit_rate: float | str | None = None
-
-    def __post_init__(self) -> None:
-        checked_rate(self.fit_rate)
-        if self.gauge is not None:
-            number(self.gauge[1], "gauge", "frequency", "positive")
 
 
 def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
@@ -200,11 +169,9 @@ def run_terms(
                 run,
                 law,
                 fixed,
-                linear=options.linear,
+                options,
                 nuisances=tuple(nuisances),
                 suffix=suffix,
-                gauge=options.gauge,
-                order=options.order,
                 **motion,
             )
         )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import equinox as eqx
 import jax
@@ -14,6 +15,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
+from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.gauge import reading_at
@@ -38,6 +40,7 @@ from asperity.inference.runs.run import RecordedRun
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
+from asperity.parameters.arguments import at_least, number, typed
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 #: The model of the noise fails if white innovations have a lower probability.
@@ -58,6 +61,42 @@ _ALONE = 0.99
 #: Largest number of spikes, or other samples, that a warning names.
 _NAMED = 5
 
+Linear = Literal["offset", "trend", "bend", "drift"]
+
+
+@typed
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of the comparison of recorded runs with the motion.
+
+    Attributes
+    ----------
+    linear : tuple of str
+        Linear nuisances of each run: "offset", "trend" (over slip), "bend" (over the square of the
+        slip) or "drift" (over time).
+    initial : {"steady", "free"}
+        Whether runs begin in steady sliding.
+    gauge : (int, float), optional
+        Order and corner frequency (Hz) of the low-pass of the force gauge.
+    order : int, optional
+        Order of the autoregressive noise; by default the data choose it.
+    fit_rate : float or str, optional
+        Number of block means per second (Hz) that replace the samples, or "full" for every sample.
+        By default recordings of up to 20,000 samples are compared sample by sample, and longer ones
+        by means over blocks that are short enough to resolve their changes.
+    """
+
+    linear: tuple[Linear, ...] = ("offset", "trend")
+    initial: Literal["steady", "free"] = "steady"
+    gauge: tuple[Annotated[int, at_least(1)], float] | None = None
+    order: Annotated[int, at_least(0)] | None = None
+    fit_rate: float | str | None = None
+
+    def __post_init__(self) -> None:
+        checked_rate(self.fit_rate)
+        if self.gauge is not None:
+            number(self.gauge[1], "gauge", "frequency", "positive")
+
 
 class RunTerm(DataTerm):
     """A recorded run as a `DataTerm` of an objective.
@@ -71,19 +110,13 @@ class RunTerm(DataTerm):
     law : type of Law
     fixed : mapping of str to float
         Parameters of the law and the machine that are not free, in SI.
-    linear : tuple of str
-        Linear nuisances: "offset", "trend" (over slip), "bend" (over the square of the slip),
-        "drift" (over time).
+    options : RunOptions
     nuisances : tuple of Unknown
         Delays of the velocity changes, the stiffness, the gain of the gauge, and departures of the
         initial states.
     suffix : str
         End of the names of the nuisances, which tells those of several runs apart.
-    gauge : (int, float), optional
-        Order and corner frequency (Hz) of the low-pass of the force gauge.
     inertia, radiation_damping : bool
-    order : int, optional
-        Order of the noise; by default the data choose it.
 
     Attributes
     ----------
@@ -104,32 +137,29 @@ class RunTerm(DataTerm):
         run: RecordedRun,
         law: type[Law],
         fixed: Mapping[str, float],
+        options: RunOptions,
         *,
-        linear: tuple[str, ...] = ("offset", "trend"),
         nuisances: tuple[Unknown, ...] = (),
         suffix: str = "",
-        gauge: tuple[int, float] | None = None,
         inertia: bool = False,
         radiation_damping: bool = False,
-        order: int | None = None,
     ) -> None:
         self.run, self.law, self.name = run, law, run.name
         self._known = {*law_parameters(law), "K", "W0", "M", "eps_ratio"}
         self._known |= {"eta"} if radiation_damping else set()
         self.fixed = {n: v for n, v in fixed.items() if n in self._known} | {"W0": run.W0}
-        self.linear, self.nuisances = linear, nuisances
+        self.options, self.nuisances = options, nuisances
         # Names of the nuisances in the motion.
         shifts = {f"step_time_{k}": f"shift_{edge}" for k, edge in enumerate(run.cuts, start=1)}
         inner = {u.name: u.name.removesuffix(suffix) for u in nuisances}
         self._own = {name: shifts.get(inside, inside) for name, inside in inner.items()}
-        self._order = order
         # In a list that copies share: the number of steps does not depend on the noise.
         self._room = [room_for(run.drive)]
         self.motion = run_equations(
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
-        self.reading = reading_at(run.at, gauge)
-        self._columns = _columns(run, linear)
+        self.reading = reading_at(run.at, options.gauge)
+        self._columns = _columns(run, options.linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
         self._alone: tuple[float, ...] = ()
@@ -170,7 +200,7 @@ class RunTerm(DataTerm):
         Under white noise a drift looks like a slow evolution of friction, and the true minimum may
         vanish. If the user has chosen the order 0, the noise stays white.
         """
-        if self._order == 0:
+        if self.options.order == 0:
             return self
         result, slow = copy(self), np.array([_SLOW])
         result.models = [Autoregression(slow, m.variance / (1 - _SLOW**2)) for m in self.models]
@@ -287,7 +317,7 @@ class RunTerm(DataTerm):
         self.models = [
             fitted(
                 [left[a:b]],
-                order=self._order,
+                order=self.options.order,
                 parameters=round(curves.shape[1] * (b - a) / left.size),
                 uncertain=[root[a:b].T],
             )
@@ -371,7 +401,7 @@ class RunTerm(DataTerm):
                 "look at the residual, leave out stretches, or give a window"
             )
         effective = float(self.noise["effective_samples"])
-        if effective < 3 * (len(self.linear) + 4):
+        if effective < 3 * (len(self.options.linear) + 4):
             sentences.append(
                 f"the noise of {self.name} is so slow that its {self.run.time.size} samples count "
                 f"as {max(effective, 1):.2g} independent of each other: the intervals are rough; "
@@ -423,7 +453,7 @@ class RunTerm(DataTerm):
     @property
     def _linear(self) -> int:
         """Number of linear nuisances, whose columns come before those of wrong samples."""
-        return len(self.linear) + len(self.run.jumps or ())
+        return len(self.options.linear) + len(self.run.jumps or ())
 
     def _inner_names(self, names: Iterable[str]) -> dict[str, str]:
         """Parameters that this run depends on, with their names in the motion."""
