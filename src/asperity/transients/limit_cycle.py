@@ -115,17 +115,36 @@ class LimitCycle:
 
     @cached_property
     def peak_velocity(self) -> float:
-        """Largest velocity of the slider (m/s)."""
-        return np.nan if self._orbit is None else self._orbit.fastest()
+        """Largest velocity of the slider (m/s): the motion between steps is smooth."""
+        # Imported here because the module loads slowly.
+        from scipy.optimize import minimize_scalar
+
+        if self._orbit is None:
+            return np.nan
+        run = self._orbit.run
+        times = run.nodes(self._orbit.begin, self._orbit.end)
+        at = int(np.argmax(run.samples(times).velocity))
+        around = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
+        scale = around[1] - around[0]
+        best = minimize_scalar(
+            lambda share: -float(run.samples(np.array([around[0] + share * scale])).velocity[0]),
+            bounds=(0.0, 1.0),
+            method="bounded",
+        )
+        return float(self._orbit.motion.V) * float(-best.fun)
 
     def force(self, t: Float) -> Float:
         """F/W0 at times (s) counted from a peak, of any period."""
         return self.force_and_rate(t)[0]
 
     def force_and_rate(self, t: Float) -> tuple[Float, Float]:
-        """F/W0 and its rate (1/s) at times (s) counted from a peak, of any period."""
+        """F/W0 and its rate, K (V - v)/W0 (1/s), at times (s) from a peak, of any period."""
         assert self._orbit is not None  # where the motion repeats itself
-        return self._orbit.force_and_rate(self._orbit.within(self._peak + np.asarray(t))[0])
+        orbit = self._orbit
+        since, _ = orbit.within(self._peak + np.asarray(t))
+        now = orbit.run.samples(since)
+        later = orbit.step @ orbit.force_slopes.evaluate(since)[: len(orbit.first)]
+        return now.force + later, float(orbit.motion.kappa) * (1 - now.velocity)
 
     def derivatives(self, t: Float, names: Sequence[str]) -> tuple[Float, Float]:
         """Derivatives of the force and of the period to parameters, with inertia.
@@ -145,7 +164,14 @@ class LimitCycle:
         period : array, shape (parameters,)
         """
         assert self._orbit is not None  # where the motion repeats itself
-        return self._orbit.derivatives(self._peak + np.asarray(t), names)
+        orbit, size = self._orbit, len(self._orbit.first)
+        columns = [size + orbit.names.index(name) for name in names]
+        first = orbit.solve(orbit.map[:, columns])
+        period = orbit.duration[:size] @ first + orbit.duration[columns]
+        since, number = orbit.within(self._peak + np.asarray(t))
+        slopes = orbit.force_slopes.evaluate(since)
+        force = slopes[:size].T @ first + slopes[columns].T
+        return force - (number * self.force_and_rate(t)[1])[:, None] * period, period
 
 
 class _Cycle(NamedTuple):
@@ -289,42 +315,6 @@ class _Orbit:
         """Times of the motion at times (s) of any period, and the number of the period."""
         number = np.floor((t - self.begin) / self.period)
         return t - number * self.period, number
-
-    def derivatives(self, t: Float, names: Sequence[str]) -> tuple[Float, Float]:
-        """Derivatives of F/W0, (n, parameters), and of the period, as of `LimitCycle`."""
-        size = len(self.first)
-        columns = [size + self.names.index(name) for name in names]
-        first = self.solve(self.map[:, columns])
-        period = self.duration[:size] @ first + self.duration[columns]
-        since, number = self.within(t)
-        slopes = self.force_slopes.evaluate(since)
-        force = slopes[:size].T @ first + slopes[columns].T
-        return force - (number * self.force_and_rate(since)[1])[:, None] * period, period
-
-    def force_and_rate(self, t: Float) -> tuple[Float, Float]:
-        """F/W0, and K (V - v)/W0 (1/s), at times of the motion."""
-        now = self.run.samples(t)
-        later = self.step @ self.force_slopes.evaluate(t)[: len(self.first)]
-        return now.force + later, float(self.motion.kappa) * (1 - now.velocity)
-
-    def fastest(self) -> float:
-        """Largest velocity (m/s): the motion between steps is smooth."""
-        # Imported here because the module loads slowly.
-        from scipy.optimize import minimize_scalar
-
-        V = float(self.motion.V)
-        times = self.run.nodes(self.begin, self.end)
-        at = int(np.argmax(self.run.samples(times).velocity))
-        around = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
-        scale = around[1] - around[0]
-        best = minimize_scalar(
-            lambda share: (
-                -float(self.run.samples(np.array([around[0] + share * scale])).velocity[0])
-            ),
-            bounds=(0.0, 1.0),
-            method="bounded",
-        )
-        return V * float(-best.fun)
 
 
 @jax.jit
