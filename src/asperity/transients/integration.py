@@ -48,68 +48,6 @@ _GAIN = 50.0
 _HOPELESS_CHUNKS = 20
 
 
-@dataclass
-class Pace:
-    """Predicts how many steps one segment takes, and whether to leave out ringing.
-
-    Parameters
-    ----------
-    rings : bool
-        Whether the equations have ringing that can be left out.
-    most_steps : float
-        Steps that an integration may take.
-    """
-
-    rings: bool
-    most_steps: float
-    _tried: bool = False
-    _hopeless: int = 0
-
-    def many(self, chunk: StepChunk, t: float, end: float) -> bool:
-        """Whether too many steps remain to `end`, if all are as long as the steps of the chunk."""
-        return _steps_left(chunk, t, end) >= _MANY_STEPS
-
-    def should_try(self, chunk: StepChunk, t: float, end: float) -> bool:
-        """Whether to try steps without ringing instead of a chunk, once in a segment.
-
-        Parameters
-        ----------
-        chunk : StepChunk
-            Steps that resolve the ringing.
-        t, end : float
-            Where they begin, and the end of the segment (s).
-        """
-        if not self.rings or self._tried or not self.many(chunk, t, end):
-            return False
-        self._tried = True
-        return True
-
-    def gained(self, chunk: StepChunk, trial: StepChunk, t: float) -> bool:
-        """Whether the steps of a trial from `t` are sufficiently longer than those of the chunk."""
-        return _length(trial, t) > _GAIN * _length(chunk, t)
-
-    def out_of_reach(
-        self, chunk: StepChunk, t: float, end: float, start: float, steps: int
-    ) -> Termination | None:
-        """The termination, if the end of the segment is too many steps away.
-
-        Parameters
-        ----------
-        chunk : StepChunk
-            The last steps, which begin at `t` (s).
-        end, start : float
-            End of the segment, and its beginning in the programme (s).
-        steps : int
-            Steps taken so far.
-        """
-        left = _steps_left(chunk, t, end)
-        self._hopeless = self._hopeless + 1 if steps + left > self.most_steps else 0
-        if left and (steps >= self.most_steps or self._hopeless >= _HOPELESS_CHUNKS):
-            detail = f"its steps of {_length(chunk, t):.3g} s would take {left:.3g} more"
-            return Termination("too many steps", start + float(chunk.t), detail)
-        return None
-
-
 def _length(chunk: StepChunk, t: float) -> float:
     """Mean length of the steps of a chunk that begins at `t` (s)."""
     return (float(chunk.t) - t) / max(int(chunk.taken), 1)
@@ -332,20 +270,21 @@ class Integration:
             return
         self._detector.enter(system, start, here.steady)
         # Its break point may make the slider ring anew.
-        pace = Pace(self._ringing > 0, self.most_steps)
+        may_leave_out, self._hopeless = self._ringing > 0, 0
         t, Y = here.t, here.states
         length = here.length
         while t < end:
             method = implicit if ringless else self._choice.method
             interval = Interval(t, Y, length, end, segment.longest_step)
             chunk, samples = self._advance(method, system, interval)
-            if not ringless and pace.should_try(chunk, t, end):
-                without = self._system(segment, True)
+            many = not ringless and _steps_left(chunk, t, end) >= _MANY_STEPS
+            if many and may_leave_out:
+                may_leave_out, without = False, self._system(segment, True)
                 trial, trial_samples = self._advance(implicit, without, interval)
-                if pace.gained(chunk, trial, t):
+                if _length(trial, t) > _GAIN * _length(chunk, t):
                     chunk, samples, system, ringless = trial, trial_samples, without, True
             if not ringless:
-                self._choice.learn(chunk, pace.many(chunk, t, end))
+                self._choice.learn(chunk, many)
             self._count(chunk, implicit if ringless else method, samples if ringless else None)
             dense_output = DenseOutput.of(chunk)
             reached = float(chunk.t)
@@ -355,7 +294,7 @@ class Integration:
             if termination is None and int(chunk.status) == UNDERFLOW:
                 termination = self._detector.underflow(reached, chunk.Y)
             if termination is None:
-                termination = pace.out_of_reach(chunk, t, end, start, self.steps)
+                termination = self._out_of_reach(chunk, t, end, start)
             if termination is not None:
                 events = [e for e in events if e.time <= termination.time]
                 events.append(Event(termination.time, termination.kind))
@@ -374,6 +313,25 @@ class Integration:
             )
             if termination is not None:
                 return
+
+    def _out_of_reach(
+        self, chunk: StepChunk, t: float, end: float, start: float
+    ) -> Termination | None:
+        """The termination, if the end of the segment is too many steps away.
+
+        Parameters
+        ----------
+        chunk : StepChunk
+            The last steps, which begin at `t` (s).
+        end, start : float
+            End of the segment, and its beginning in the programme (s).
+        """
+        left = _steps_left(chunk, t, end)
+        self._hopeless = self._hopeless + 1 if self.steps + left > self.most_steps else 0
+        if left and (self.steps >= self.most_steps or self._hopeless >= _HOPELESS_CHUNKS):
+            detail = f"its steps of {_length(chunk, t):.3g} s would take {left:.3g} more"
+            return Termination("too many steps", start + float(chunk.t), detail)
+        return None
 
     def _standstill(
         self, system: SegmentEquations, start: float, termination: Termination
