@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -328,6 +329,24 @@ class LineSums:
         self.t, self.tt, self.y, self.ty, self.yy = (
             np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)
         )
+
+    def of(self, part: Index) -> LineSums:
+        """The sums with the cells of some events only."""
+        some = copy(self)
+        some.origin, some.level = self.origin[part], self.level[part]
+        return some
+
+    def at(self, first: Index, stop: Index, place: Float | Index) -> tuple[Float, Float, Float]:
+        """Height of the line at a place (samples) less `level`, its slope and squared residuals.
+
+        Parameters
+        ----------
+        first, stop, place : array, (k, ...)
+            The run is inside one cell.
+        """
+        level, slope, squares, _ = self.line(first, stop)
+        origin = self.origin.reshape(-1, *[1] * (place.ndim - 1))
+        return level + slope * (place - origin), slope, squares
 
     def line(self, first: Index, stop: Index) -> tuple[Float, Float, Float, Float]:
         """Level and slope at the origin of the cell, sum of squared residuals, mean of t.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,6 @@ from asperity.measurement.stick_slip.detection import Falls, LineSums
 from asperity.recording.defects.autoregression import Autoregression, fitted
 from asperity.recording.defects.levels import recorder_step
 
-#: For each event: peak, trough, and first and last sample of the part that is fitted.
-Bounds = tuple[Index, ...]
 Shape = Callable[[Float, Float], Float]
 
 #: Lines are long enough that noise moves their ends by this share of the drop at most; longer lines
@@ -133,14 +132,52 @@ def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
+class _Windows(NamedTuple):
+    """The part of the force that is fitted to each event.
+
+    Attributes
+    ----------
+    sums : LineSums
+    peak, trough : array, (k,)
+        Samples of the fall.
+    first, stop : array, (k,)
+        First sample of the line before the slip, and the sample after the line that follows it.
+    rate : array, (k,)
+        Loading by the drive (per sample).
+    """
+
+    sums: LineSums
+    peak: Index
+    trough: Index
+    first: Index
+    stop: Index
+    rate: Float
+
+    def of(self, part: Index) -> _Windows:
+        """The windows of some events."""
+        return _Windows(self.sums.of(part), *(values[part] for values in self[1:]))
+
+    def lines(
+        self, onset: Float, end: Float
+    ) -> tuple[Index, Index, tuple[Float, ...], tuple[Float, ...]]:
+        """The first sample of the slip and the first after it, and the lines before and after.
+
+        Of a line its height at the onset or the end, its slope, and its sum of squared residuals;
+        onset and end are of shape (k, ...).
+        """
+        first, stop = (v.reshape(-1, *[1] * (onset.ndim - 1)) for v in (self.first, self.stop))
+        until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
+        since = np.minimum(np.ceil(end).astype(np.intp), stop - 2)
+        return until, since, self.sums.at(first, until, onset), self.sums.at(since, stop, end)
+
+
 def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
-    peak, trough = falls.peak, falls.trough
+    peak, trough, scatter = falls.peak, falls.trough, falls.scatter
     k, n = peak.size, force.size
     # Cells end in the middle of the sticks.
     edges = (np.append(0, trough) + np.append(peak, n)) // 2
-    sums = LineSums(force, edges[:-1], peak)
-    drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
-    length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
+    drop = np.maximum(force[peak] - force[trough], 2 * scatter[0])
+    length = np.ceil((2 * scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
     # The tail of an exponential fall is as long again as the part between its quarters.
     length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - length + (trough - peak))
@@ -148,39 +185,25 @@ def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     # Only the middle half of a stick is fitted: inertia, a ringing gauge and creep bend its ends.
     quarter = (peak[1:] - trough[:-1]) // 4
     middles = trough[:-1] + quarter, peak[1:] - quarter + 2
-    sticks = _sticks(force, *middles, falls.scatter)
+    sticks = _sticks(force, *middles, scatter)
     rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
-    bounds = peak, trough, first, stop
+    windows = _Windows(LineSums(force, edges[:-1], peak), peak, trough, first, stop, rate)
     # The shape is estimated from events of the whole recording. They are not the largest events:
     # among equal slips, noise alone decides which is the largest.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
     large = large[np.linspace(0, large.size - 1, min(large.size, _MEASURED_EVENTS)).astype(np.intp)]
-    of_large = tuple(b[large] for b in bounds)
     noise = _noise(force, *(middles if k > 1 else (first, peak)))
-    scatter = falls.scatter
-    timing = _timing(sums, large, of_large, rate[large], drop[large], noise, scatter)
-    shape = timing.shape
+    timing = _timing(windows.of(large), drop[large], noise, scatter)
     fits = [
-        _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
+        _onset_and_end(windows.of(part), timing.shape)
         for part in np.array_split(np.arange(k), -(-k // _FITTED_TOGETHER))
     ]
     onset, end, _ = (np.concatenate(values) for values in zip(*fits, strict=True))
-    slips, parts = (onset, end), (first, stop)
-    slow = _slow_noise_factor(sums, edges[1:-1], slips, parts, sticks.slope, scatter)
-    return _events_from_fits(time, force, scatter, sums, slips, parts, sticks, timing, slow)
+    slow = _slow_noise_factor(windows, edges[1:-1], onset, end, sticks.slope, scatter)
+    return _events_from_fits(time, force, scatter, windows, onset, end, sticks, timing, slow)
 
 
-def _onset_and_end(
-    sums: LineSums,
-    part: Index,
-    peak: Index,
-    trough: Index,
-    first: Index,
-    stop: Index,
-    *,
-    rate: Float,
-    shape: Shape,
-) -> tuple[Float, Float, Float]:
+def _onset_and_end(windows: _Windows, shape: Shape) -> tuple[Float, Float, Float]:
     """Onset and end by least squares, on grids that zoom in.
 
     Returns
@@ -189,6 +212,7 @@ def _onset_and_end(
     squares : array, (k,)
         Sum of the squares of all residuals, apart from a constant.
     """
+    sums, peak, trough, first, stop, rate = windows
     length = (trough - peak).astype(float)
     middle = (peak + trough) / 2
     earliest = np.minimum(np.maximum(first + 3.0, peak - 2 * length), peak - 1.0)
@@ -197,15 +221,10 @@ def _onset_and_end(
     span_end = [np.maximum(middle - length / 4, peak + 0.5), latest]
     grid = np.linspace(0.0, 1.0, _CANDIDATES)
     rows = np.arange(peak.size)
-    at = sums.origin[part][:, None]
     for _ in range(_ZOOMS):
         on = span_on[0][:, None] + (span_on[1] - span_on[0])[:, None] * grid
         off = span_end[0][:, None] + (span_end[1] - span_end[0])[:, None] * grid
-        until, since = _line_ends(on, off, first[:, None], stop[:, None])
-        left = sums.line(first[:, None], until)
-        right = sums.line(since, stop[:, None])
-        high = left[0] + left[1] * (on - at)
-        low = right[0] + right[1] * (off - at)
+        until, since, (high, _, before), (low, _, after) = windows.lines(on, off)
         # The slip as sums over bins, from the earliest onset to the latest end.
         edges = np.linspace(span_on[0], span_end[1] + 1.0, _BINS + 1, axis=1)
         edges = np.clip(np.rint(edges).astype(np.intp), first[:, None], stop[:, None])
@@ -222,7 +241,7 @@ def _onset_and_end(
         misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
-        misfit += left[2][:, :, None] + right[2][:, None, :]
+        misfit += before[:, :, None] + after[:, None, :]
         # The end comes after the onset, and the force falls.
         wrong = (off[:, None, :] <= on[:, :, None]) | (low[:, None, :] >= high[:, :, None])
         misfit[wrong] = np.inf
@@ -234,12 +253,6 @@ def _onset_and_end(
             span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
     squares = misfit[rows, i, j]
     return onset, end, np.where(np.isfinite(squares), squares, 0.0)
-
-
-def _line_ends(onset: Float, end: Float, first: Index, stop: Index) -> tuple[Index, Index]:
-    """The sample after the line up to the onset, and the first of the line after the end."""
-    until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
-    return until, np.minimum(np.ceil(end).astype(np.intp), stop - 2)
 
 
 def _free_slip(u: Float, loaded: Float) -> Float:
@@ -293,15 +306,7 @@ class _Timing:
     shift: float
 
 
-def _timing(
-    sums: LineSums,
-    part: Index,
-    bounds: Bounds,
-    rate: Float,
-    drop: Float,
-    noise: Autoregression,
-    scatter: Float,
-) -> _Timing:
+def _timing(windows: _Windows, drop: Float, noise: Autoregression, scatter: Float) -> _Timing:
     """The shape of all slips of a recording, by comparison with simulated recordings.
 
     For each shape, slips are simulated with noise of the recording's spectrum, and all shapes are
@@ -318,38 +323,33 @@ def _timing(
     # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
     from scipy.signal import lfilter
 
-    first, stop = bounds[2:]
-    k = part.size
-
-    def read(sums: LineSums, part: Index, bounds: Bounds, rate: Float) -> list[tuple[Float, ...]]:
-        return [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
+    k, first = windows.peak.size, windows.first
 
     def contrasts(fits: list[tuple[Float, ...]], drop: Float) -> Float:
         squares = np.array([fit[2] for fit in fits])
         return (squares[1:] - squares[0]) / drop**2
 
-    fits = read(sums, part, bounds, rate)
+    fits = [_onset_and_end(windows, shape) for shape in _SHAPES]
     seen = contrasts(fits, drop).mean(1)
     # Windows of the events, one after the other, several times.
     many = np.repeat(np.arange(k), -(-_SIMULATED_EVENTS // k))
-    size = (stop - first)[many]
+    size = (windows.stop - first)[many]
     begin = np.concatenate([[0], np.cumsum(size)])
     event = np.repeat(np.arange(many.size), size)
     place = np.arange(begin[-1]) - begin[event] + first[many][event]
-    window = tuple((b[many] - first[many] + begin[:-1]).astype(np.intp) for b in bounds)
+    shift = begin[:-1] - first[many]
+    moved = [(bound[many] + shift).astype(np.intp) for bound in windows[1:5]]
     rng = np.random.default_rng(0)
     taps = np.concatenate([[1.0], -noise.coefficients[-1]])
     distance, shifts, factors, means, covariances = [], [], [], [], []
     for shape, (onset, end, *_) in zip(_SHAPES, fits, strict=True):
-        clean = _fitted_force(
-            sums, part, shape, (onset, end), (first, stop), rate, place, many[event]
-        )
+        clean = _fitted_force(windows, shape, onset, end, place, many[event])
         settling = 10 * taps.size
         white = rng.standard_normal(settling + place.size)
         made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
-        again = read(
-            LineSums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many]
-        )
+        sums = LineSums(made, begin[:-1], moved[0])
+        simulated = _Windows(sums, *moved, windows.rate[many])
+        again = [_onset_and_end(simulated, each) for each in _SHAPES]
         values = contrasts(again, drop[many])
         covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
         means.append(values.mean(1))
@@ -357,7 +357,6 @@ def _timing(
         off = seen - means[-1]
         distance.append(float(off @ np.linalg.pinv(covariance, hermitian=True) @ off))
         length = (end - onset)[many]
-        shift = begin[:-1] - first[many]
         late = np.array(
             [[f[n] - t[many] - shift for f in again] for n, t in enumerate((onset, end))]
         )
@@ -373,9 +372,9 @@ def _timing(
     best = best if distance[0] - distance[best] > 9 * excess else 0
     weight = np.exp((min(distance) - np.array(distance)) / (2 * excess))
     weight /= weight.sum()
-    moved = np.array(shifts)[:, :, best]
-    variance = weight @ moved**2
-    variance = _with_mixtures(variance, means, seen, covariances[best], moved, best)
+    off_by = np.array(shifts)[:, :, best]
+    variance = weight @ off_by**2
+    variance = _with_mixtures(variance, means, seen, covariances[best], off_by, best)
     return _Timing(_SHAPES[best], float(factors[best][best]), float(np.sqrt(variance.max())))
 
 
@@ -421,52 +420,36 @@ def _with_mixtures(
 
 
 def _fitted_force(
-    sums: LineSums,
-    part: Index,
-    shape: Shape,
-    slips: tuple[Float, Float],
-    bounds: tuple[Index, Index],
-    rate: Float,
-    place: Index,
-    owner: Index,
+    windows: _Windows, shape: Shape, onset: Float, end: Float, place: Index, owner: Index
 ) -> Float:
     """Fitted force, line, slip and line, at the samples `place` of the events `owner`."""
-    (onset, end), (first, stop) = slips, bounds
-    until, since = _line_ends(onset, end, first, stop)
-    left, right = sums.line(first, until), sums.line(since, stop)
-    origin = sums.origin[part]
-    high = left[0] + left[1] * (onset - origin)
-    low = right[0] + right[1] * (end - origin)
+    _, _, (high, before, _), (low, after, _) = windows.lines(onset, end)
     length = np.maximum(end - onset, 0.25)
     u = np.clip((place - onset[owner]) / length[owner], 0.0, 1.0)
     drop = np.maximum(high - low, np.finfo(float).tiny)
-    slip = low[owner] + drop[owner] * shape(u, (rate * length / drop)[owner])
-    slip += left[1][owner] * np.minimum(place - onset[owner], 0.0)
-    return np.asarray(slip + right[1][owner] * np.maximum(place - end[owner], 0.0))
+    slip = low[owner] + drop[owner] * shape(u, (windows.rate * length / drop)[owner])
+    slip += before[owner] * np.minimum(place - onset[owner], 0.0)
+    return np.asarray(slip + after[owner] * np.maximum(place - end[owner], 0.0))
 
 
 def _events_from_fits(
     time: Float,
     force: Float,
     scatter: Float,
-    sums: LineSums,
-    slips: tuple[Float, Float],
-    bounds: tuple[Index, Index],
+    windows: _Windows,
+    onset: Float,
+    end: Float,
     sticks: _Sticks,
     timing_of: _Timing,
     slow: float,
 ) -> SlipEvents:
     """Events with uncertainties; slow noise multiplies the uncertainties of forces by `slow`."""
-    (onset, end), (first, stop) = slips, bounds
+    sums, first, stop = windows.sums, windows.first, windows.stop
     step = float(time[-1] - time[0]) / (force.size - 1)
-    until, since = _line_ends(onset, end, first, stop)
-
-    def level(begin: Index, close: Index, at: Float) -> tuple[Float, Float]:
-        mean, slope, *_ = sums.line(begin, close)
-        return mean + slope * (at - sums.origin) + sums.level, slope
-
-    high, before = level(first, until, onset)
-    low, after = level(since, stop, end)
+    until, since, (high, before, _), (low, after, _) = windows.lines(onset, end)
+    creeps = (sums.at(until - (until - first) // 2, until, onset)[0] - high).sum()
+    rings = (sums.at(since, since + (stop - since) // 2, end)[0] - low).sum()
+    high, low = high + sums.level, low + sums.level
     drop = high - low
     # The end of a line is twice as uncertain as its mean. Lines through half of the samples differ
     # from the whole lines where sticks bend: by creep in proportion to the loading before the slip,
@@ -476,8 +459,6 @@ def _events_from_fits(
     # The level of a line may lie anywhere within a step of the recorder.
     rounding = recorder_step(force) / np.sqrt(6.0)
     of_noise = np.hypot(of_noise, rounding)
-    creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
-    rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
     bend = creeps / rise.sum() * rise - rings / drop.sum() * drop
     error = np.hypot(of_noise, bend)
@@ -558,34 +539,27 @@ def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
 
 
 def _slow_noise_factor(
-    sums: LineSums,
-    edges: Index,
-    slips: tuple[Float, Float],
-    bounds: tuple[Index, Index],
-    slope: Float,
-    scatter: Float,
+    windows: _Windows, edges: Index, onset: Float, end: Float, slope: Float, scatter: Float
 ) -> float:
     """Ratio of the true uncertainty of a drop to the uncertainty by the scatter of means.
 
     In the middle of a stick there is no slip, and the lines before and after should meet. Hum and
     other noise slower than a thirty-second of a cycle keep them apart.
     """
-    (begin, end), (first, stop) = slips, bounds
-    half = (end - begin)[:-1] / 2
+    half = (end - onset)[:-1] / 2
     # After a slip the gauge may ring, and before the next slip the slider creeps.
-    margin = (begin[1:] - end[:-1]) / 8
+    margin = (onset[1:] - end[:-1]) / 8
     until, since = np.floor(edges - half).astype(np.intp), np.ceil(edges + half).astype(np.intp)
-    lead = np.minimum(until - end[:-1] - margin, (begin - first)[1:]).astype(np.intp)
-    tail = np.minimum(begin[1:] - margin - since, (stop - end)[:-1]).astype(np.intp)
+    lead = np.minimum(until - end[:-1] - margin, (onset - windows.first)[1:]).astype(np.intp)
+    tail = np.minimum(onset[1:] - margin - since, (windows.stop - end)[:-1]).astype(np.intp)
     long = (lead >= _SHORTEST) & (tail >= _SHORTEST)
     if not long.any():
         return 1.0
     until, since, lead, tail = until[long], since[long], lead[long], tail[long]
-    before, left = sums.line(until - lead, until)[:2]
-    after, right = sums.line(since, since + tail)[:2]
     cells = np.flatnonzero(long)
-    high = before + left * (until - sums.origin[cells]) + sums.level[cells]
-    low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
+    before, after = windows.sums.of(cells), windows.sums.of(cells + 1)
+    high = before.at(until - lead, until, until)[0] + before.level
+    low = after.at(since, since + tail, since)[0] + after.level
     drop = high - low + slope[long] * (since - until)
     error = 2 * np.hypot(_scatter_of_mean(scatter, lead), _scatter_of_mean(scatter, tail))
     # The median: some sticks hold slips that were not detected.
