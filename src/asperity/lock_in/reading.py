@@ -342,19 +342,11 @@ def _jacobian(
     """Derivatives of the numbers of a reading by (beta of the load, omega, beta of the force)."""
     n = phasors.shape[0]
     linear = first + 2 * n
-    size = 2 * linear + fitted
-    k = np.arange(n)
-
-    def phasor_rows(at: int) -> Complex:
-        rows = np.zeros((n, size), dtype=complex)
-        rows[k, at + first + k] = 1.0
-        rows[k, at + first + n + k] = -1j
-        return rows
-
-    load, force = phasor_rows(0), phasor_rows(linear + fitted)
-    level, mean = np.zeros(size), np.zeros(size)
-    level[:first] = average / mean_load
-    mean[linear + fitted :][:first] = average
+    # The numbers are computed from these rows as they are from the coefficients themselves.
+    every = np.eye(2 * linear + fitted)
+    of_load, of_force = every[:linear], every[linear + fitted :]
+    load, force = (rows[first : first + n] - 1j * rows[first + n :] for rows in (of_load, of_force))
+    level, mean = average @ of_load[:first] / mean_load, average @ of_force[:first]
     # Relative change of the load's fundamental: real part amplitude, imaginary part phase.
     fundamental = load[0] / phasors[0, 0]
     order = np.arange(1, n + 1)[:, None]
@@ -362,18 +354,14 @@ def _jacobian(
     lost = 1j * order * fundamental.imag + level
     force_rows = turn * force - relative[:, 1:] * lost
     load_rows = turn * load - relative[:, :1] * lost
-    frequency = np.zeros(size)
-    if fitted:
-        frequency[linear] = 1 / (2 * math.pi)
-    friction = mean_force / mean_load
     return np.vstack(
         [
             level * mean_load,
             abs(relative[0, 0]) * (fundamental.real - level),
-            frequency,
+            every[linear : linear + fitted].sum(0) / (2 * math.pi),
             mean,
-            mean / mean_load - friction * level,
-            np.stack([force_rows.real, force_rows.imag], axis=1).reshape(-1, size),
-            np.stack([load_rows.real, load_rows.imag], axis=1).reshape(-1, size)[2:],
+            mean / mean_load - mean_force / mean_load * level,
+            np.stack([force_rows.real, force_rows.imag], axis=1).reshape(2 * n, -1),
+            np.stack([load_rows.real, load_rows.imag], axis=1).reshape(2 * n, -1)[2:],
         ]
     )
