@@ -274,34 +274,21 @@ def sums(
 
 
 def _even(basis: Basis, time: Float, channels: list[Float], length: int, step: float) -> BlockSums:
-    table = basis.columns(basis.centre + step * np.arange(float(length)))
-    whole = time.size // length
-    parts = [_turned(basis, time[0], channels, table, step, 0, whole)]
-    if left := time.size - whole * length:
-        tail = [channel[whole * length :] for channel in channels]
-        parts.append(_turned(basis, time[0], tail, table[:, :left].copy(), step, whole * length, 1))
+    """Blocks by matrix products with one table of columns, each then rotated by its phase."""
+    columns = basis.columns(basis.centre + step * np.arange(float(length)))
+    whole = time.size // length * length
+    parts = []
+    for first, stop, count in ((0, whole, length), (whole, time.size, time.size - whole)):
+        if not count:
+            continue
+        table = columns[:, :count]
+        start = time[0] + step * np.arange(first, stop, count)
+        shift = basis.shift(start)
+        raw = [channel[first:stop].reshape(-1, count) @ table.T for channel in channels]
+        gram = shift @ (table @ table.T) @ shift.transpose(0, 2, 1)
+        samples, middle = np.full(start.size, float(count)), start + step * (count - 1) / 2
+        parts.append(BlockSums(basis, gram, shift @ np.stack(raw, axis=-1), samples, middle))
     return join(parts)
-
-
-def _turned(
-    basis: Basis,
-    begin: float,
-    channels: list[Float],
-    table: Float,
-    step: float,
-    first: int,
-    blocks: int,
-) -> BlockSums:
-    """Blocks of the table's length by a matrix product, then each rotated by its phase."""
-    length = table.shape[1]
-    raw = np.stack(
-        [c[: blocks * length].reshape(blocks, length) @ table.T for c in channels], axis=-1
-    )
-    start = begin + step * (first + length * np.arange(blocks))
-    shift = basis.shift(start)
-    gram = shift @ (table @ table.T) @ shift.transpose(0, 2, 1)
-    count = np.full(blocks, float(length))
-    return BlockSums(basis, gram, shift @ raw, count, start + step * (length - 1) / 2)
 
 
 def _uneven(basis: Basis, time: Float, channels: list[Float], length: int) -> BlockSums:
