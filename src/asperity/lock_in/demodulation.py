@@ -20,7 +20,7 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from asperity.arrays import Complex, Float
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.lock_in.noise import local_noise, noise_around, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import (
@@ -173,16 +173,15 @@ def read(
     settlings: tuple[Settling, ...] = ()
     if settles:
         residual = residual_sums(blocks, full)
-        white = _white(blocks, residual)
-        around, _ = noise_around(1, blocks, residual[:, 1], white, settles=False)
+        around, _ = noise_around(1, blocks, residual[:, 1], settles=False)
         variance = float(around[0, 0].real * outer[linear, linear]) if refine else 0.0
-        settlings = find_settlings(blocks, 1, full[:, 1], inner, float(white[1, 1]), variance)
+        settlings = find_settlings(blocks, 1, full[:, 1], inner, variance)
         without_settling = without(blocks, 1, settlings)
         beta[:, 1] -= inner @ (moments - without_settling.totals()[1])[:linear, 1]
         blocks, full = without_settling, _on_basis(basis, beta, change)
     residual = residual_sums(blocks, full)
     mean_settles = any(s.present and not s.order for s in settlings)
-    noise = local_noise(blocks, residual, _white(blocks, residual), mean_settles)
+    noise = local_noise(blocks, residual, mean_settles)
     plain = np.eye(basis.size)[:, :linear]
     disturbed = sum_covariance(basis, gram, noise, (selected, plain))
     # Errors of (beta of the load, omega, beta of the force) are linear in the sums of the noise.
@@ -209,12 +208,6 @@ def _on_basis(basis: Basis, beta: Float, change: float) -> Float:
     for c in (0, 1):
         full[:, c] += change * frequency_direction(basis, beta[:, c])
     return full
-
-
-def _white(blocks: BlockSums, residual: Complex) -> Float:
-    """Covariance of the residual if it is white, from its sums over the blocks."""
-    total = residual[:, 0].real
-    return total.T @ total / max(float(blocks.count.sum()) - blocks.basis.linear - 1, 1.0)
 
 
 def _check_lengths(time: Float, load: Float, force: Float, field: str) -> None:

@@ -81,9 +81,7 @@ def harmonic_sums(sums: Float, basis: Basis, order: int) -> Complex:
     return np.asarray(sums[:, at] - 1j * sums[:, at + basis.harmonics])
 
 
-def local_noise(
-    blocks: BlockSums, residual: Complex, white: Float, settles: bool = False
-) -> LocalNoise:
+def local_noise(blocks: BlockSums, residual: Complex, settles: bool) -> LocalNoise:
     """Noise around each harmonic.
 
     Parameters
@@ -91,21 +89,21 @@ def local_noise(
     blocks : BlockSums
     residual : complex array, (blocks, n + 1, channels)
         From `residual_sums`.
-    white : array, (channels, channels)
-        Covariance of the residual, used where the window is too short to resolve lines.
     settles : bool
         Whether an exponential settling of the mean was fitted too.
     """
     orders = range(blocks.basis.harmonics + 1)
-    noises = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
+    noises = [noise_around(k, blocks, residual[:, k], settles=settles) for k in orders]
     spectra, dof = zip(*noises, strict=True)
     return LocalNoise(np.array(spectra), np.array(dof))
 
 
 def noise_around(
-    k: int, blocks: BlockSums, residual: Complex, white: Float, *, settles: bool
+    k: int, blocks: BlockSums, residual: Complex, *, settles: bool
 ) -> tuple[Complex, float]:
     """Spectral matrix of the noise around one harmonic, and its degrees of freedom.
+
+    Where the window is too short to resolve lines, the noise counts as white.
 
     Parameters
     ----------
@@ -114,7 +112,7 @@ def noise_around(
     blocks : BlockSums
     residual : complex array, (blocks, channels)
         Sums of the residual times e^(-i k phi).
-    white, settles
+    settles : bool
         As in `local_noise`.
     """
     basis, samples = blocks.basis, float(blocks.count.sum())
@@ -123,7 +121,8 @@ def noise_around(
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
     lines = _free_lines(k, periods, blocks, 1 + (basis.degree > 0) + settles)
     if lines.size < 2 * _FEWEST:
-        return white.astype(complex), max(samples - basis.linear - 1, 1.0)
+        dof = max(samples - basis.linear - 1, 1.0)
+        return residual.T @ residual.conj() / dof, dof
     turned = _at_lines(np.rint(2 * (lines - k * periods)).astype(np.intp), at, residual)
     near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
     spectrum = near.T @ near.conj() / (near.shape[0] * samples)

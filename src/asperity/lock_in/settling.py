@@ -124,10 +124,7 @@ def settling_of_mean(blocks: BlockSums) -> Settling | None:
     inner = inverted(gram[:linear, :linear])
     fitted = np.zeros(blocks.basis.size)
     fitted[:linear] = inner @ moments[:linear, 0]
-    left = (blocks.moments[:, 0, 0] - blocks.gram[:, 0] @ fitted) / np.sqrt(blocks.count)
-    # If there are too few blocks for spectral lines, the differences between blocks are noise.
-    white = float(left @ left) / max(blocks.count.size - linear, 1)
-    return _Profile(blocks, 0, fitted, inner, white, 0, 0.0).settling()
+    return _Profile(blocks, 0, fitted, inner, 0, 0.0).settling()
 
 
 def find_settlings(
@@ -135,7 +132,6 @@ def find_settlings(
     channel: int,
     fitted: Float,
     inner: Float,
-    white: float,
     omega_variance: float,
 ) -> tuple[Settling, ...]:
     """The possible settlings of a channel: of its mean and of each harmonic.
@@ -148,8 +144,6 @@ def find_settlings(
         Coefficients of the fit without settling.
     inner : array, (linear, linear)
         Inverse of the normal matrix.
-    white : float
-        Variance of the residual.
     omega_variance : float
         Variance of the angular frequency, in (rad/s)^2; 0 if it is exact.
     """
@@ -165,9 +159,8 @@ def find_settlings(
             left = (cleaned.moments - blocks.moments)[:, :linear, channel].sum(0)
             coefficients = fitted.copy()
             coefficients[:linear] += inner @ left
-            settling = _Profile(
-                cleaned, channel, coefficients, inner, white, order, omega_variance
-            ).settling()
+            profile = _Profile(cleaned, channel, coefficients, inner, order, omega_variance)
+            settling = profile.settling()
             if settling is not None and settling.possible:
                 settlings[order] = settling
         sweep = [order for order, settling in sorted(settlings.items()) if settling.present]
@@ -195,13 +188,12 @@ class _Profile:
         channel: int,
         fitted: Float,
         inner: Float,
-        white: float,
         order: int,
         omega_variance: float,
     ) -> None:
         basis, n = blocks.basis, blocks.basis.harmonics
         self._blocks, self._channel, self._order = blocks, channel, order
-        self._fitted, self._inner, self._white = fitted, inner, white
+        self._fitted, self._inner = fitted, inner
         # Each column of a settling is a straight line in u times one of these.
         level = np.array([0]) if not order else basis.drift + order - 1 + np.array([0, n])
         self._columns = [level]
@@ -348,9 +340,8 @@ class _Profile:
 
     def _noise(self, left: Float, *, settles: bool) -> tuple[float, float]:
         """Variance of white noise as strong as that of this order, and its degrees of freedom."""
-        white = np.array([[self._white]])
         around = harmonic_sums(left, self._blocks.basis, self._order)[:, None]
-        spectrum, dof = noise_around(self._order, self._blocks, around, white, settles=settles)
+        spectrum, dof = noise_around(self._order, self._blocks, around, settles=settles)
         # Rounding of the channel is noise too, where there is no other.
         rounding = np.finfo(float).eps * float(np.abs(self._fitted).max())
         least = np.finfo(float).tiny
