@@ -10,6 +10,7 @@ harmonics with a level as without.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -154,33 +155,26 @@ def lines_in_the_pauses(
     parts : list of LoadInterval
         Modulated and unmodulated parts of the recording.
     """
-    largest: tuple[float, str, bool] | None = None
-    for part in parts:
-        if part.modulated:
+    answers = []
+    orders = range(1, min(reading.harmonics.size, 2) + 1)
+    pauses = [slice(part.first, part.stop) for part in parts if not part.modulated]
+    for cut, n in product(pauses, orders):
+        f, harmonic = n * reading.frequency, reading.phasor(n)
+        line, background = _line(samples.time[cut], samples.force[cut], f)
+        if not background < np.inf:
             continue
-        for n in (1, 2):
-            if n > reading.harmonics.size:
-                continue
-            f = n * reading.frequency
-            cut = slice(part.first, part.stop)
-            line, background = _line(samples.time[cut], samples.force[cut], f)
-            if not background < np.inf:
-                continue
-            harmonic = reading.phasor(n)
-            height = max(harmonic.amplitude, harmonic.amplitude_uncertainty) * abs(reading.W0)
-            number = line / height
-            # An effect smaller than the uncertainty of the harmonic is not reported.
-            seen = line > max(_SEEN * background, harmonic.amplitude_uncertainty * abs(reading.W0))
-            if largest is None or (seen, number) > (largest[2], largest[0]):
-                sentence = (
-                    f"without modulation the force has a line of {number:.2g} mu{n} "
-                    f"{symbol('W0')} at {f:.6g} Hz: mains, cross-talk or the drive, "
-                    "which is part of the reading"
-                )
-                largest = number, sentence, seen
-    if largest is None:
+        doubt = harmonic.amplitude_uncertainty
+        number = line / (max(harmonic.amplitude, doubt) * abs(reading.W0))
+        # An effect smaller than the uncertainty of the harmonic is not reported.
+        seen = line > max(_SEEN * background, doubt * abs(reading.W0))
+        sentence = (
+            f"without modulation the force has a line of {number:.2g} mu{n} {symbol('W0')} at "
+            f"{f:.6g} Hz: mains, cross-talk or the drive, which is part of the reading"
+        )
+        answers.append((seen, number, sentence))
+    if not answers:
         return ()
-    number, sentence, seen = largest
+    seen, number, sentence = max(answers, key=lambda answer: answer[:2])
     if not seen:
         sentence = "without modulation the force has no significant line at f and 2f"
     return (LOCK_IN.check("lines in the pauses", number, sentence, significant=seen),)
