@@ -10,16 +10,21 @@ from typing import TYPE_CHECKING, Any
 from asperity.errors import symbol
 from asperity.measurement.campaign import Row, modulated_rows, sliding_rows
 from asperity.measurement.record import modulated_record, sliding_record
-from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
+from asperity.measurement.stick_slip.catalogue import (
+    stick_slip_record,
+    stick_slip_row,
+    summary_rows,
+)
+from asperity.measurement.verdicts.verdict import Check, worst
 from asperity.outputs.sections import Section, rounded
 from asperity.parameters import Names
+from asperity.units import display_unit, format_si, quantity_text
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
-    from asperity.measurement.verdicts.verdict import Check
     from asperity.recording.finding import Finding
 
 
@@ -171,8 +176,6 @@ def _sliding(measurement: SlidingMeasurement, name: str) -> list[Section]:
 
 
 def _stick_slip(measurement: StickSlipMeasurement, name: str) -> list[Section]:
-    from asperity.measurement.stick_slip.catalogue import summary_rows
-
     time = measurement.time
     rate = (time.size - 1) / float(time[-1] - time[0])
     head = (
@@ -220,8 +223,6 @@ def _time(seconds: float) -> str:
 
 def _duration(seconds: float) -> str:
     """A duration in the unit that reads best, hours and days among them."""
-    from asperity.units import quantity_text
-
     for unit, size in (("d", 86400), ("h", 3600)):
         if seconds >= 2 * size:
             return f"{seconds / size:.6g} {unit}"
@@ -230,8 +231,6 @@ def _duration(seconds: float) -> str:
 
 def velocity_text(velocity: float) -> str:
     """A velocity with four digits; "-" where it is not known, zero below an atom a day."""
-    from asperity.units import format_si
-
     if not math.isfinite(velocity):
         return "-"
     return "0 m/s" if abs(velocity) < _STILL else format_si(velocity, "velocity", 4)
@@ -289,8 +288,6 @@ def _holds(measurement: SlidingMeasurement) -> list[Section]:
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
     """A number rounded to two digits of its uncertainty."""
-    from asperity.units import display_unit
-
     # In a unit with a prefix, such as MPa, or in days.
     unit, power = display_unit(value, unit)
     number, uncertain = rounded(value * 10.0**-power, doubt * 10.0**-power)
@@ -304,8 +301,6 @@ def _number(value: float, doubt: float) -> str:
 
 def _quality(checks: Iterable[Check]) -> Section:
     """A row for each name of a check: the worst of that name, and the number of the others."""
-    from asperity.measurement.verdicts.verdict import worst
-
     by_name: dict[str, list[Check]] = {}
     for check in checks:
         by_name.setdefault(check.name, []).append(check)
