@@ -424,9 +424,7 @@ def _pause(
     rate = None
     if time.size > _FEWEST:
         at, means = bin_means(time, force)
-        fit = fit_trend(columns(at - at[0], 1), means)
-        doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
-        rate = Rate(float(fit.beta[1]), doubt, float(fit.dof))
+        rate = fit_trend(columns(at - at[0], 1), means).rate(1)
     shift = variance = 0.0
     settling = settling_from(time, force, _no_modulation(time), 1) if recovers else None
     if settling is not None and settling.possible:

@@ -220,6 +220,11 @@ class TrendFit:
     variance: float
     dof: int
 
+    def rate(self, k: int) -> Rate:
+        """A coefficient that is a rate."""
+        uncertainty = float(np.sqrt(self.variance * self.inverse[k, k]))
+        return Rate(float(self.beta[k]), uncertainty, float(self.dof))
+
 
 def bin_means(at: Float, values: Float) -> tuple[Float, Float]:
     """Mean positions and values in bins of equal width; empty bins are left out.

@@ -24,6 +24,7 @@ from asperity.measurement.series import (
     slope_of,
     weighted_line,
 )
+from asperity.measurement.sliding.segments import Cut
 
 #: Fewest samples at the end of a hold whose line gives the relaxation.
 _FEWEST_AT_END = 6
@@ -119,13 +120,12 @@ def read_hold(
     time: Float,
     friction: Float,
     displacement: Float | None,
-    bounds: tuple[int, int, int, int],
-    edges: tuple[float, float],
+    samples: tuple[int, int],
+    ends: tuple[Cut, Cut],
     velocity: float,
     *,
     degree: int,
-    end_uncertainty: float = 0.0,
-    resolution: float = 0.0,
+    resolution: float,
 ) -> HoldReading:
     """Read one hold.
 
@@ -133,16 +133,14 @@ def read_hold(
     ----------
     time, friction, displacement : array, (n,)
         Times, friction and displacement of the recording; displacement None if it is not recorded.
-    bounds : (int, int, int, int)
-        Samples: steady sliding before, hold, sliding after, its end.
-    edges : (float, float)
-        First and last time of the hold (s).
+    samples : (int, int)
+        First sample of the steady sliding before, and the sample after the sliding that follows.
+    ends : (Cut, Cut)
+        Begin and end of the hold.
     velocity : float
         Velocity of the sliding after the hold (m/s).
     degree : int
         Degree of the trend before the hold: 0 or 1.
-    end_uncertainty : float
-        Uncertainty of the end of the hold (s).
     resolution : float
         Step of the recorder in friction.
     """
@@ -150,8 +148,9 @@ def read_hold(
     def rounding(values: Float) -> float:
         return float(rounding_variance(resolution, float(np.std(values)))[0])
 
-    begin, hold, again, stop = bounds
-    slid, mu = bin_means(time[begin:hold] - edges[0], friction[begin:hold])
+    (begin, stop), (start, end) = samples, ends
+    hold, again = start.sample, end.sample
+    slid, mu = bin_means(time[begin:hold] - start.time, friction[begin:hold])
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])
     doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0] + rounding(friction[begin:hold])))
@@ -160,22 +159,19 @@ def read_hold(
     left = mu - columns(slid, min(degree, 1)) @ fit.beta
     slow_variance = max(float(np.var(left)) - scatter**2 * mu.size / (hold - begin), 0.0)
     # Samples that may belong to the reloading already are left out.
-    ends = max(hold + 1, int(np.searchsorted(time, edges[1] - end_uncertainty)))
-    low, low_doubt, falls = _end_of_hold(time[hold:ends] - edges[1], friction[hold:ends], scatter)
-    low_doubt = np.sqrt(
-        low_doubt**2 + slow_variance + rounding(friction[hold:ends][-_FEWEST_AT_END:])
-    )
+    rest = slice(hold, max(hold + 1, int(np.searchsorted(time, end.time - end.doubt))))
+    low, low_doubt, falls = _end_of_hold(time[rest] - end.time, friction[rest], scatter)
+    low_doubt = np.sqrt(low_doubt**2 + slow_variance + rounding(friction[rest][-_FEWEST_AT_END:]))
     peak, peak_doubt, dof, at = _peak(time, friction, again, stop, level, scatter)
     peak_doubt = float(np.sqrt(peak_doubt**2 + slow_variance + rounding(np.array([peak]))))
     dof = effective_dof([(doubt, fit.dof), (peak_doubt, dof)])
-    half = float(stdtrit(dof, 0.975))
     healing_doubt = float(np.hypot(doubt, peak_doubt))
     creep = -falls / abs(velocity) if velocity else np.nan
     slope, slope_doubt = _reload(friction, displacement, again, at, low, peak, creep)
     return HoldReading(
-        start=edges[0],
-        end=edges[1],
-        hold_time=edges[1] - edges[0],
+        start=start.time,
+        end=end.time,
+        hold_time=end.time - start.time,
         velocity=velocity,
         level=level,
         level_uncertainty=doubt,
@@ -186,7 +182,7 @@ def read_hold(
         healing=peak - level,
         healing_uncertainty=healing_doubt,
         dof=dof,
-        interval_95=half * healing_doubt,
+        interval_95=float(stdtrit(dof, 0.975)) * healing_doubt,
         reload_slope=slope,
         reload_uncertainty=slope_doubt,
     )

@@ -321,11 +321,10 @@ def _holds(
                 signals.time,
                 direction * signals.friction,
                 signals.displacement,
-                (begin, b, c, d),
-                (cut.cuts[k - 1].time, cut.cuts[k].time),
+                (begin, d),
+                (cut.cuts[k - 1], cut.cuts[k]),
                 cut.velocities[k + 1],
                 degree=degree,
-                end_uncertainty=cut.cuts[k].doubt,
                 resolution=resolution,
             )
         )

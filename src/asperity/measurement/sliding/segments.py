@@ -400,9 +400,7 @@ def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> Rate:
     line = np.searchsorted(jumps, np.arange(t.size), side="right")
     at, means = bin_means(since, x - x.mean())
     shares = [bin_means(since, (line == k).astype(float))[1] for k in range(jumps.size + 1)]
-    fit = fit_trend(np.stack([at, *shares], axis=1), means)
-    variance = float(fit.variance * fit.inverse[0, 0])
-    return Rate(float(fit.beta[0]), float(np.sqrt(variance)), float(fit.dof))
+    return fit_trend(np.stack([at, *shares], axis=1), means).rate(0)
 
 
 def _duration(motion: _Motion, piece: Piece) -> float:
