@@ -9,7 +9,6 @@ from asperity.lock_in.reading import Phasor
 from references.planted_recordings import covered
 from references.populations import draws, population
 
-SEEDS = 200
 NAMES = ("W0", "epsilon", "frequency", "mean_friction", "mu1", "phase1", "mu2", "phase2")
 
 #: Samples, seconds between them, frequency, correlation of neighbours (AR1), noise of the load and
@@ -24,21 +23,22 @@ CASES = {
 
 
 @pytest.mark.slow
+@draws(60, 200)
 @pytest.mark.parametrize(
     "case", population(["shared by both", *(c for c in CASES if c != "shared by both")])
 )
-def test_intervals_contain_the_truth_as_often_as_they_state(truth, red_noise, case) -> None:
+def test_intervals_contain_the_truth_as_often_as_they_state(truth, red_noise, case, draws) -> None:
     n, dt, frequency, rho, of_load, of_force, shared = CASES[case]
     truth = truth.but(frequency=frequency, drift=1e-3)
     rng = np.random.default_rng(20)
-    pairs = (red_noise(rng, rho, 2, n) for _ in range(SEEDS))
+    pairs = (red_noise(rng, rho, 2, n) for _ in range(draws))
     noises = [(of_load * a, of_force * b + shared * of_load * a) for a, b in pairs]
     hits = covered(truth, noises, 1 / dt, NAMES)
     shares = np.array(list(hits.values()))
     # The mean lies in 92 to 98 %; each share agrees with this range at a significance of 1e-3.
     assert 0.92 < shares.mean() < 0.98, hits
-    assert shares.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
-    assert shares.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
+    assert shares.min() >= binom.ppf(1e-3, draws, 0.92) / draws, hits
+    assert shares.max() <= binom.ppf(1 - 1e-3, draws, 0.98) / draws, hits
 
 
 def test_variances_in_white_noise_are_those_of_the_textbook(truth) -> None:

@@ -7,6 +7,7 @@ from scipy.special import ndtri
 import asperity as asp
 from asperity.lock_in import rounding
 from asperity.lock_in.rounding import common_phases, rounding_variance, step_of
+from references.populations import draws
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.3, 1.7, 6.2])
@@ -92,9 +93,11 @@ def scores(measurement, source):
     ]
 
 
-def test_uncertainties_include_the_rounding(truth, protocol, trace, monkeypatch) -> None:
+@draws(5, 10)
+def test_uncertainties_include_the_rounding(truth, protocol, trace, monkeypatch, draws) -> None:
+    recordings = [coarse(truth, protocol, seed) for seed in range(draws)]
+
     def rms_score():
-        recordings = [coarse(truth, protocol, seed) for seed in range(10)]
         squares = [
             np.square(scores(asp.measure(trace(*signals), modulated=True), source))
             for source, signals in recordings

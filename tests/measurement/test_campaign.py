@@ -114,7 +114,7 @@ def test_a_campaign_whose_process_dies_is_refused_and_can_be_resumed(amplitudes,
     with pytest.raises(InputError, match="jobs must be processes for which there is memory, got 2"):
         run_campaign(files, rows_of, out, inputs=ROWS.inputs(), jobs=2)
     assert not out.exists()
-    done = run_campaign(files, ROWS, out, inputs=ROWS.inputs(), resume=True, jobs=2)
+    done = run_campaign(files, ROWS, out, inputs=ROWS.inputs(), resume=True)
     assert (done.files, done.failed) == (2, 0)
 
 

@@ -117,7 +117,7 @@ def test_a_friction_that_agrees_with_force_and_load_changes_nothing() -> None:
     assert measure_sliding(with_friction).friction == alone.friction
 
 
-@pytest.mark.parametrize("factor", [1e-3, 0.5, -3.0, 1e3])
+@pytest.mark.parametrize("factor", population([1e-3, -3.0, 0.5, 1e3], short=2))
 def test_a_friction_that_contradicts_force_and_load_is_refused(factor) -> None:
     time, slip, load, shear, friction = stepped(0)
     signals = channels(slip=slip, sigma=load, tau=factor * shear, mu=friction)

@@ -331,14 +331,14 @@ def test_delta_mu_uncertainty_includes_noise_of_the_load_in_the_pauses(
 ) -> None:
     variances = []
     for seed in range(8):
-        time, load, force = protocol(truth, noise=1e-3, on=(6.0, 12.0), end=12.0, seed=seed)
+        time, load, force = protocol(truth, noise=1e-3, on=(4.0, 8.0), end=8.0, seed=seed)
         of_load = 0.05 * np.random.default_rng(100 + seed).standard_normal(time.size)
         force = force + truth.mean_friction * of_load if shared else force
         measurement = measure(trace(time, load + of_load, force))
         modulated = measurement.reading.uncertainty("mean_friction")
         variances.append(max(measurement.delta_mu_uncertainty**2 - modulated**2, 0.0))
-    # Propagated error of the mean of F/W over the 6,000 samples before the modulation.
-    expected = truth.mean_friction * 0.05 / truth.W0 / np.sqrt(6000)
+    # Propagated error of the mean of F/W over the 4,000 samples before the modulation.
+    expected = truth.mean_friction * 0.05 / truth.W0 / np.sqrt(4000)
     if shared:
         assert np.median(variances) < (0.05 * expected) ** 2
     else:

@@ -123,7 +123,7 @@ def random_motion(rng):
     return time, slip, noise, v, spans, ramps
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_random_motions_are_cut_right_or_reported_as_doubtful(seed) -> None:
     for k in range(6):
         time, slip, noise, v, spans, ramps = random_motion(np.random.default_rng([seed, k]))

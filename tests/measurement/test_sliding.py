@@ -245,10 +245,13 @@ def faulty(friction, fault, seed):
     return friction
 
 
+@draws(2, 3)
 @pytest.mark.parametrize("fault", ["spikes", "coarse", "line"])
-def test_intervals_of_holds_cover_faults_of_the_recorder(pulled, sliding_trace, fault) -> None:
+def test_intervals_of_holds_cover_faults_of_the_recorder(
+    pulled, sliding_trace, fault, draws
+) -> None:
     scores = []
-    for seed in range(3):
+    for seed in range(draws):
         time, slip, clean, friction, bounds = pulled(
             (V, 0.0, V, 0.0, V), (400e-6, 20.0 + seed, 400e-6, 200.0, 400e-6), (50,) * 5,
             noise=1e-4, seed=seed, resolution=2e-8,
@@ -292,10 +295,11 @@ def test_the_uncertainty_of_the_reload_slope_includes_slip_on_the_rise(
     assert least < reading.reload_uncertainty / STIFFNESS < most
 
 
+@draws(2, 3)
 @pytest.mark.parametrize("noise", [1e-3, 1e-4, 1e-5])
-def test_the_top_of_a_peak_is_no_parabola(pulled, sliding_trace, noise) -> None:
+def test_the_top_of_a_peak_is_no_parabola(pulled, sliding_trace, noise, draws) -> None:
     """Friction rises faster than it falls: a parabola through the top is 8e-5 too low."""
-    for seed in range(3):
+    for seed in range(draws):
         time, slip, clean, friction, bounds = pulled(
             (V, 0.0, V), (400e-6, 100.0, 400e-6), (100,) * 3, noise=noise, seed=seed
         )
