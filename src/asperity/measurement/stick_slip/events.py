@@ -7,7 +7,7 @@ drive continues to move.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -155,7 +155,8 @@ class _Windows(NamedTuple):
 
     def of(self, part: Index) -> _Windows:
         """The windows of some events."""
-        return _Windows(self.sums.of(part), *(values[part] for values in self[1:]))
+        peak, trough, first, stop = (bound[part] for bound in self[1:5])
+        return _Windows(self.sums.of(part), peak, trough, first, stop, self.rate[part])
 
     def lines(
         self, onset: Float, end: Float
@@ -325,7 +326,7 @@ def _timing(windows: _Windows, drop: Float, noise: Autoregression, scatter: Floa
 
     k, first = windows.peak.size, windows.first
 
-    def contrasts(fits: list[tuple[Float, ...]], drop: Float) -> Float:
+    def contrasts(fits: Sequence[tuple[Float, ...]], drop: Float) -> Float:
         squares = np.array([fit[2] for fit in fits])
         return (squares[1:] - squares[0]) / drop**2
 
@@ -338,7 +339,7 @@ def _timing(windows: _Windows, drop: Float, noise: Autoregression, scatter: Floa
     event = np.repeat(np.arange(many.size), size)
     place = np.arange(begin[-1]) - begin[event] + first[many][event]
     shift = begin[:-1] - first[many]
-    moved = [(bound[many] + shift).astype(np.intp) for bound in windows[1:5]]
+    peak, trough, start, stop = (bound[many] + shift for bound in windows[1:5])
     rng = np.random.default_rng(0)
     taps = np.concatenate([[1.0], -noise.coefficients[-1]])
     distance, shifts, factors, means, covariances = [], [], [], [], []
@@ -347,8 +348,8 @@ def _timing(windows: _Windows, drop: Float, noise: Autoregression, scatter: Floa
         settling = 10 * taps.size
         white = rng.standard_normal(settling + place.size)
         made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
-        sums = LineSums(made, begin[:-1], moved[0])
-        simulated = _Windows(sums, *moved, windows.rate[many])
+        sums = LineSums(made, begin[:-1], peak)
+        simulated = _Windows(sums, peak, trough, start, stop, windows.rate[many])
         again = [_onset_and_end(simulated, each) for each in _SHAPES]
         values = contrasts(again, drop[many])
         covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
