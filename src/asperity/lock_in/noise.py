@@ -56,29 +56,23 @@ def residual_sums(blocks: BlockSums, beta: Float) -> Complex:
     -------
     complex array, (blocks, n + 1, channels)
     """
-    left = blocks.moments - blocks.gram @ beta
-    orders = range(blocks.basis.harmonics + 1)
-    return np.stack([harmonic_sums(left, blocks.basis, k) for k in orders], axis=1)
+    return harmonic_sums(blocks.moments - blocks.gram @ beta, blocks.basis)
 
 
-def harmonic_sums(sums: Float, basis: Basis, order: int) -> Complex:
-    """Sums times e^(-i k phi), from sums times the columns.
+def harmonic_sums(sums: Float, basis: Basis) -> Complex:
+    """Sums times e^(-i k phi), k = 0..n, from sums times the columns.
 
     Parameters
     ----------
     sums : array, (blocks, size, ...)
     basis : Basis
-    order : int
-        k.
 
     Returns
     -------
-    complex array, (blocks, ...)
+    complex array, (blocks, n + 1, ...)
     """
-    if not order:
-        return sums[:, 0].astype(complex)
-    at = basis.drift + order - 1
-    return np.asarray(sums[:, at] - 1j * sums[:, at + basis.harmonics])
+    cosine, sine = np.split(sums[:, basis.drift : basis.linear], 2, axis=1)
+    return np.concatenate([sums[:, :1], cosine - 1j * sine], axis=1)
 
 
 def local_noise(blocks: BlockSums, residual: Complex, settles: bool) -> LocalNoise:

@@ -340,7 +340,7 @@ class _Profile:
 
     def _noise(self, left: Float, *, settles: bool) -> tuple[float, float]:
         """Variance of white noise as strong as that of this order, and its degrees of freedom."""
-        around = harmonic_sums(left, self._blocks.basis, self._order)[:, None]
+        around = harmonic_sums(left, self._blocks.basis)[:, self._order, None]
         spectrum, dof = noise_around(self._order, self._blocks, around, settles=settles)
         # Rounding of the channel is noise too, where there is no other.
         rounding = np.finfo(float).eps * float(np.abs(self._fitted).max())
