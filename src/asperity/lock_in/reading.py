@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import fdtri, stdtrit
 
 from asperity.arrays import Complex, Float
 from asperity.errors import require, require_known
@@ -67,8 +68,6 @@ class Phasor:
 
     def excludes(self, value: complex, level: float = 0.95) -> bool:
         """Whether `value` lies outside the confidence ellipse of probability `level`."""
-        from scipy.special import fdtri
-
         away = np.array([value.real - self.value.real, value.imag - self.value.imag])
         # Without noise the ellipse is a point.
         spread = np.linalg.eigvalsh(self.covariance)
@@ -172,6 +171,14 @@ class LockInReading:
         middle = (self.start + self.end) / 2
         return self.frequency * (time - middle) + self.phase / (2 * np.pi)
 
+    def waves(self, cycles: Float, channel: int) -> Float:
+        """Sum of the fitted harmonics of W/W0 (channel 0) or F/W0 (1) at phases over 2 pi, (n,)."""
+        total, power, turn = np.zeros(cycles.shape), 1.0, np.exp(2j * np.pi * cycles)
+        for harmonic in (self.load_harmonics, self.harmonics)[channel]:
+            power = power * turn
+            total += (harmonic * power).real
+        return total
+
     def residual_of_piece(self, time: Float, values: Float) -> tuple[slice, Float]:
         """The middle of a window, `PIECE` samples at most, and the residual of a fit to it alone.
 
@@ -237,8 +244,6 @@ class LockInReading:
         level : float
             Probability.
         """
-        from scipy.special import stdtrit
-
         if name.startswith("phase") and not self.phasor(int(name[5:])).excludes(0, level):
             return math.pi
         digits = "".join(filter(str.isdigit, name.removeprefix("W0")))

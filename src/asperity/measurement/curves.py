@@ -11,7 +11,6 @@ from asperity.arrays import Bool, Float
 from asperity.lock_in.reference import spectrum
 
 if TYPE_CHECKING:
-    from asperity.lock_in.reading import LockInReading
     from asperity.measurement.measure import Measurement
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
@@ -48,21 +47,13 @@ def mean_cycle(measurement: Measurement) -> MeanCycle:
     reading, cut = measurement.reading, slice(*measurement.window)
     time, force = measurement.samples.time[cut], measurement.samples.force[cut]
     friction, phase = reading.without_settling(time, force) / reading.W0, reading.cycles(time)
-    level = Polynomial.fit(time, friction - _harmonics(reading, phase), reading.drift.shape[1])
+    level = Polynomial.fit(time, friction - reading.waves(phase, 1), reading.drift.shape[1])
     where = ((phase % 1.0) * _BINS).astype(int) % _BINS
     samples = np.bincount(where, minlength=_BINS)
     mean = np.bincount(where, friction - level(time), minlength=_BINS) / np.maximum(samples, 1)
     filled = samples > 0
     middles, fine = ((np.arange(_BINS) + 0.5) / _BINS)[filled], np.linspace(0, 1, 400)
-    return MeanCycle(middles, mean[filled], fine, _harmonics(reading, fine))
-
-
-def _harmonics(reading: LockInReading, phase: Float) -> Float:
-    """Sum of the fitted harmonics of F/W0 at phases over 2 pi."""
-    fitted = np.zeros(phase.shape)
-    for n, harmonic in enumerate(reading.harmonics, 1):
-        fitted += (harmonic * np.exp(2j * np.pi * n * phase)).real
-    return fitted
+    return MeanCycle(middles, mean[filled], fine, reading.waves(fine, 1))
 
 
 def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:

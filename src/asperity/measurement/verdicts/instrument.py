@@ -266,14 +266,7 @@ def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> 
 def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int) -> _Cycle | None:
     """Values folded by the phase of the load, without what is slower than a period."""
     cycles = reading.cycles(time)
-    phasors = (reading.load_harmonics, reading.harmonics)[channel] * reading.W0
-    order = np.arange(1, phasors.size + 1)
-    fitted = np.zeros_like(values)
-    turn, power = np.exp(2j * np.pi * cycles), 1.0
-    for phasor in phasors:
-        power = power * turn
-        fitted += (phasor * power).real
-    left = values - fitted
+    left = values - reading.W0 * reading.waves(cycles, channel)
     whole = int(max(1, min((cycles[-1] - cycles[0]) / _MEAN_PERIODS, values.size / _MEAN_SAMPLES)))
     edges = np.linspace(0, values.size, whole + 1).astype(int)[:-1]
     counts = np.diff([*edges, values.size])
@@ -292,7 +285,7 @@ def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int
     noise = float(np.mean((left - np.interp(phase, place, folded, period=1.0)) ** 2))
     # Noise that is coloured may be stronger at the harmonics.
     noise = max(noise, float(reading.noise.spectra[1:, channel, channel].real.max()))
-    folded += (phasors * np.exp(2j * np.pi * place[:, None] * order)).real.sum(1)
+    folded += reading.W0 * reading.waves(place, channel)
     height = float(np.ptp(folded))
     if not height > 0:
         return None
