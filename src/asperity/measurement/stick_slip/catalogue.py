@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError
+from asperity.errors import require
 from asperity.measurement.campaign import first_columns
 from asperity.measurement.series import mean_level
 from asperity.measurement.stick_slip.threshold import linear_frequency
@@ -124,9 +124,8 @@ def write_catalogue(measurement: StickSlipMeasurement, path: Path) -> None:
 def check_catalogue(path: Path) -> str:
     """Ending of the catalogue's file; raises `InputError` for one that is not written."""
     ending = path.suffix.lower()
-    if ending not in (".csv", ".nc", ".json"):
-        rule = "be a CSV, NetCDF or JSON file"
-        raise InputError(Argument("measure.events"), rule, f"'{path}'", "write it like events.csv")
+    rule, advice = "be a CSV, NetCDF or JSON file", "write it like events.csv"
+    require(ending in (".csv", ".nc", ".json"), "measure.events", rule, f"'{path}'", advice)
     return ending
 
 
@@ -157,7 +156,7 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
                 ),
             }
     stiffness, uncertainty = measurement.stiffness_from_slope
-    machine = measurement.machine
+    K, V, M, W0 = measurement.machine.numbers
     row |= {
         "force_before": float(np.mean(events.force_before)) if len(events) else math.nan,
         "loading_slope": measurement.loading_slope,
@@ -166,12 +165,10 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
         "stiffness_from_slope_uncertainty": uncertainty,
         "smallest_drop": measurement.smallest_drop,
     }
-    K, V, W0 = np.array([machine.stiffness, machine.velocity, machine.load], float)
     frequency, error = linear_frequency(events, K * V / W0)
     row |= {"linear_frequency": frequency, "linear_frequency_uncertainty": error}
-    known = (machine.stiffness, machine.velocity, machine.mass, machine.load)
-    row |= {n: v for n, v in zip(("K", "V", "M", "W0"), known, strict=True) if v is not None}
-    return row
+    machine = {"K": K, "V": V, "M": M, "W0": W0}
+    return row | {name: number for name, number in machine.items() if np.isfinite(number)}
 
 
 def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, Any]:

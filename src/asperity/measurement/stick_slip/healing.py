@@ -81,10 +81,13 @@ def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> S
     x = np.log(np.asarray(stick_durations, float))
     y, uncertainty = np.asarray(drops, float), np.asarray(uncertainties, float)
     n = x.size
+    reason = ""
     if n < _FEWEST:
-        return _without_result(n, f"{n} recordings are too few; at least {_FEWEST} are needed")
-    if np.ptp(x) == 0:
-        return _without_result(n, "all recordings have one and the same stick time")
+        reason = f"{n} recordings are too few; at least {_FEWEST} are needed"
+    elif np.ptp(x) == 0:
+        reason = "all recordings have one and the same stick time"
+    if reason:
+        return StickSlipHealing(np.nan, np.nan, (np.nan, np.nan), n, reason)
     extra = 0.0
     for _ in range(_PASSES):
         variance = uncertainty**2 + extra
@@ -95,14 +98,8 @@ def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> S
     slope, spread = float(line.beta[1]), float(np.sqrt(line.covariance[1, 1]))
     half = float(stdtrit(n - 2, 0.975)) * spread
     interval = slope - half, slope + half
-    reason = ""
     if np.ptp(x) < 1:
         reason = f"stick times range over {np.ptp(x):.2g} e-folds; at least one is needed"
     elif interval[0] <= 0 <= interval[1]:
         reason = f"the 95 % interval, {interval[0]:.2g} to {interval[1]:.2g}, holds zero"
     return StickSlipHealing(slope, spread, interval, n, reason)
-
-
-def _without_result(recordings: int, reason: str) -> StickSlipHealing:
-    none = float("nan")
-    return StickSlipHealing(none, none, (none, none), recordings, reason)

@@ -72,6 +72,11 @@ class Machine:
     mass: float | None = None
     load: float | None = None
 
+    @property
+    def numbers(self) -> Float:
+        """K, V, M and W0; NaN where unknown."""
+        return np.array([self.stiffness, self.velocity, self.mass, self.load], float)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StickSlipMeasurement(Judged):
@@ -130,13 +135,8 @@ class StickSlipMeasurement(Judged):
     @property
     def stiffness_from_slope(self) -> tuple[float, float]:
         """K (N/m) from the loading slope, and its standard uncertainty; NaN if unknown."""
-        load, velocity = self.machine.load, self.machine.velocity
-        if load is None or velocity is None:
-            return np.nan, np.nan
-        return (
-            self.loading_slope * load / velocity,
-            self.loading_slope_uncertainty * load / velocity,
-        )
+        _, V, _, W0 = self.machine.numbers
+        return self.loading_slope * W0 / V, self.loading_slope_uncertainty * W0 / V
 
     @property
     def clear(self) -> bool:
@@ -198,12 +198,16 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     machine = _machine(question, signals, events)
     slope, slope_uncertainty = _loading(events)
     smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
-    period = None
-    if machine.mass and machine.stiffness:
-        period = 2 * np.pi * np.sqrt(machine.mass / machine.stiffness)
+    K, _, M, _ = machine.numbers
     share = impulses.size / time.size
     parts = regimes(
-        time, friction, events, smallest, falls=len(falls), impulses=share, natural_period=period
+        time,
+        friction,
+        events,
+        smallest,
+        falls=len(falls),
+        impulses=share,
+        natural_period=2 * np.pi * float(np.sqrt(M / K)),
     )
     slip_share = _slip_share(signals, events)
     slip, speed, energy = _slip_from_spring(events, machine)
@@ -332,14 +336,11 @@ def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
 
 def _slip_from_spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
     """Slip, largest slip velocity and energy of each event, by F = K (V t - x) without inertia."""
-    if machine.stiffness is None or machine.load is None:
-        none = np.full(len(events), np.nan)
-        return none, none, none
-    compliance = machine.load / machine.stiffness
-    velocity = np.nan if machine.velocity is None else machine.velocity
-    slip = events.drop * compliance + velocity * events.slip_duration
-    speed = velocity + events.fall_rate * compliance
-    energy = machine.load * compliance * (events.force_before**2 - events.force_after**2) / 2
+    K, V, _, W0 = machine.numbers
+    compliance = W0 / K
+    slip = events.drop * compliance + V * events.slip_duration
+    speed = V + events.fall_rate * compliance
+    energy = W0 * compliance * (events.force_before**2 - events.force_after**2) / 2
     return slip, speed, energy
 
 

@@ -95,7 +95,7 @@ def regimes(
     *,
     falls: int = 0,
     impulses: float = 0.0,
-    natural_period: float | None = None,
+    natural_period: float = np.nan,
 ) -> tuple[Regime, ...]:
     """Divide a recording into trains of events and what lies between.
 
@@ -109,8 +109,8 @@ def regimes(
         Number of falls of the force, slip events or not.
     impulses : float
         Share of the samples that were taken for impulses.
-    natural_period : float, optional
-        2 pi sqrt(M/K) (s).
+    natural_period : float
+        2 pi sqrt(M/K) (s); NaN where it is not known.
     """
     if not len(events):
         return (_without_events(time, force, smallest_drop, falls, impulses),)
@@ -239,7 +239,7 @@ def _train(
     first: int,
     stop: int,
     span: tuple[float, float],
-    natural_period: float | None,
+    natural_period: float,
 ) -> Regime:
     number = stop - first
     if number < _FEWEST:
@@ -263,12 +263,12 @@ def _train(
         text += ": the force does not rise alike in the sticks, as a spring loads"
         return Regime("cannot tell", *span, first, stop, text)
     cycle = float(np.median(recurrence))
-    inertial = natural_period is not None and abs(cycle / natural_period - 1) < _INERTIAL
-    if natural_period is not None:
+    inertial = abs(cycle / natural_period - 1) < _INERTIAL
+    if np.isfinite(natural_period):
         text += f", median cycle {cycle / natural_period:.3g} times 2 pi sqrt(M/K)"
     if ratio < _SYMMETRICAL or (inertial and ratio < STICKING):
         return Regime("oscillation about sliding", *span, first, stop, text + _mains(cycle))
-    if ratio < STICKING and natural_period is None:
+    if ratio < STICKING and not np.isfinite(natural_period):
         text += ": between stick-slip and an oscillation; give stiffness and mass to decide"
         return Regime("cannot tell", *span, first, stop, text)
     kind: Kind = "irregular stick-slip"
