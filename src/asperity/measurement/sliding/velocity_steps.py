@@ -13,6 +13,8 @@ readings, weighted by precision, and their spread is part of its uncertainty.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
@@ -124,8 +126,7 @@ class VelocityStep:
     choices: tuple[StepChoice, ...] = field(repr=False)
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
+class _Side(NamedTuple):
     """Bin means on one side of a step over slip from the step."""
 
     slip: Float
@@ -224,15 +225,14 @@ def _transient(
     free_waves = np.stack([free(stepped - wave) for wave in waves])
     gram, moment = free_waves @ free_waves.T, free_waves @ free_friction
     gain, chosen, amplitudes = -1.0, (0, 1), np.zeros(2)
-    for slow in range(1, decays.size):
-        for fast in range(slow):
-            # Columns wave[slow] and wave[slow] - wave[fast], which vanish at the step.
-            ss, sf, ff = gram[slow, slow], gram[slow, fast], gram[fast, fast]
-            matrix = np.array([[ss, ss - sf], [ss - sf, ss - 2 * sf + ff]])
-            aim = np.array([moment[slow], moment[slow] - moment[fast]])
-            beta = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True) @ aim
-            if float(beta @ aim) > gain:
-                gain, chosen, amplitudes = float(beta @ aim), (fast, slow), beta
+    for fast, slow in combinations(range(decays.size), 2):
+        # Columns wave[slow] and wave[slow] - wave[fast], which vanish at the step.
+        ss, sf, ff = gram[slow, slow], gram[slow, fast], gram[fast, fast]
+        matrix = np.array([[ss, ss - sf], [ss - sf, ss - 2 * sf + ff]])
+        aim = np.array([moment[slow], moment[slow] - moment[fast]])
+        beta = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True) @ aim
+        if float(beta @ aim) > gain:
+            gain, chosen, amplitudes = float(beta @ aim), (fast, slow), beta
     quickest, slowest = (float(decays[k]) for k in chosen)
     a, b = amplitudes
     shape = np.abs(b * np.exp(-after.slip / quickest) - (a + b) * np.exp(-after.slip / slowest))
