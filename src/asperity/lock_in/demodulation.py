@@ -21,7 +21,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import require
 from asperity.lock_in.noise import local_noise, noise_around, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import (
     Basis,
@@ -106,8 +106,8 @@ def lock_in(
     """
     degree = DRIFTS[detrend]
     _check(time, load, force, harmonics, degree)
-    if frequency is None and not refine:
-        raise InputError("lock_in.frequency", "be given with refine=False", "None", "give it in Hz")
+    known, rule = refine or frequency is not None, "be given with refine=False"
+    require(known, "lock_in.frequency", rule, "None", "give it in Hz")
     if refine:
         line = strongest_line(time, load, between=around(frequency))
         require_modulated(line, load)
@@ -294,11 +294,10 @@ class LockInStream:
         basis = self._basis
         first, last = basis.centre - basis.half_width, basis.centre + basis.half_width
         slack = 1e-9 * basis.half_width
-        if not (time[0] >= first - slack and time[-1] <= last + slack):
-            rule = f"get times from {first:.10g} s to {last:.10g} s"
-            got = f"{time[0]:.10g} s to {time[-1]:.10g} s"
-            advice = "give start and end of all that follows"
-            raise InputError("LockInStream.add", rule, got, advice)
+        inside = time[0] >= first - slack and time[-1] <= last + slack
+        rule = f"get times from {first:.10g} s to {last:.10g} s"
+        got = f"{time[0]:.10g} s to {time[-1]:.10g} s"
+        require(inside, "LockInStream.add", rule, got, "give start and end of all that follows")
         share = (time[-1] - time[0]) / (2 * basis.half_width)
         step = even_step(time, basis.omega * basis.harmonics)
         blocks = max(1, round(BLOCKS * share))
@@ -316,11 +315,9 @@ class LockInStream:
         """
         require(self._parts, "LockInStream.add", "be called before read", "no samples", "add some")
         reading = read(join(self._parts), span=self._span)
-        off = 2 * np.pi * reading.frequency - self._basis.omega
-        if abs(off) * self._basis.half_width > _OFF:
-            raise InputError(
-                f"LockInStream.frequency must be good to {_OFF} rad at the ends of the window, got "
-                f"{self._basis.omega / (2 * np.pi):.10g} Hz where about "
-                f"{reading.frequency:.10g} Hz was measured; start again with that"
-            )
+        omega, rule = self._basis.omega, f"be good to {_OFF} rad at the ends of the window"
+        near = abs(2 * np.pi * reading.frequency - omega) * self._basis.half_width <= _OFF
+        measured = f"about {reading.frequency:.10g} Hz was measured"
+        got = f"{omega / (2 * np.pi):.10g} Hz where {measured}"
+        require(near, "LockInStream.frequency", rule, got, "start again with that")
         return reading

@@ -390,11 +390,10 @@ def _of_table(files: Sequence[Path], path: Path) -> dict[Path, dict[str, float |
     columns: Mapping[str, list[Any]] = read_headed_columns(
         path, MACHINE_FIELDS, texts=("file",), label=_LABEL, row="a recording"
     )
-    if "file" not in columns or len(columns) < 2:
-        raise InputError(
-            f"{path.name} must have the column file and some of {', '.join(MACHINE_FIELDS)}, got "
-            f"{', '.join(columns) or 'none'}; add them"
-        )
+    rule = f"have the column file and some of {', '.join(MACHINE_FIELDS)}"
+    complete = "file" in columns and len(columns) > 1
+    require(complete, path.name, rule, ", ".join(columns) or "none", "add them")
+    rule = "have one row for each recording"
     result: dict[Path, dict[str, float | str]] = {}
     owners: dict[int, Path] = {}
     for file in files:
@@ -405,17 +404,12 @@ def _of_table(files: Sequence[Path], path: Path) -> dict[Path, dict[str, float |
         here = [n for n in rows if file.parent.parts[-1:] == Path(columns["file"][n]).parts[-2:-1]]
         rows = here or rows
         if len(rows) == 1 and owners.setdefault(rows[0], file) != file:
-            raise InputError(
-                f"{path.name} must have one row for each recording, got one for "
-                f"'{owners[rows[0]]}' and '{file}'; write the folder in the column file too"
-            )
+            got = f"one for '{owners[rows[0]]}' and '{file}'"
+            raise InputError(path.name, rule, got, "write the folder in the column file too")
         if len(rows) != 1:
             names = [Path(name).name for name in columns["file"]]
             advice = closest(file.name, names) if not rows else "leave one out"
-            raise InputError(
-                f"{path.name} must have one row for each recording, got {len(rows)} for "
-                f"'{file.name}'; {advice}"
-            )
+            raise InputError(path.name, rule, f"{len(rows)} for '{file.name}'", advice)
         result[file] = {
             field: columns[name][rows[0]] for name, field in MACHINE_FIELDS.items()
             if name in columns

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import Argument, ConstantLoadError, InputError
+from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -369,10 +369,9 @@ def _rows_of_window(time: Float, window: tuple[float, float]) -> tuple[int, int]
     start, end = window
     first = int(np.searchsorted(time, start, side="left"))
     stop = int(np.searchsorted(time, end, side="right"))
-    if stop - first < 16:
-        rule = "enclose at least 16 samples"
-        advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
-        raise InputError("measure.window", rule, f"{start:g} s to {end:g} s", advice)
+    rule, got = "enclose at least 16 samples", f"{start:g} s to {end:g} s"
+    advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+    require(stop - first >= 16, "measure.window", rule, got, advice)
     return first, stop
 
 

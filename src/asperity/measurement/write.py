@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from asperity.errors import InputError, require
+from asperity.errors import require
 from asperity.measurement.campaign import table_file, write_rows
 from asperity.measurement.measure import Measurement
 from asperity.measurement.report import measured_rows
@@ -58,8 +58,7 @@ def write(
     """
     if isinstance(data, Trace):
         return write_recording(data, path, units=units)
-    if units:
-        raise InputError("write.units", "go with a recording", "measurements", "leave them out")
+    require(not units, "write.units", "go with a recording", "measurements", "leave them out")
     measured = [data] if isinstance(data, Measured) else data
     require(measured, "data", "hold a measurement", "none", "give one")
     # A measurement does not know its file.

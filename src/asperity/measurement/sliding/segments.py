@@ -18,7 +18,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.errors import InputError, require
+from asperity.errors import require
 from asperity.measurement.series import Rate, bin_means, fit_trend, neighbour_scatter, slope_of
 from asperity.recording.defects.levels import recorder_step
 
@@ -170,10 +170,9 @@ def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
     InputError
         If a time lies outside of the recording, or there are too few samples between two times.
     """
+    rule, extent = "lie inside the recording", f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
     for at in cuts:
-        if not time[0] < at < time[-1]:
-            advice = f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
-            raise InputError(label, "lie inside the recording", f"{at:.10g} s", advice)
+        require(time[0] < at < time[-1], label, rule, f"{at:.10g} s", extent)
     samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
     for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
         rule = f"rise, with at least {_FEWEST} samples between them and the ends"
