@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,12 +23,9 @@ from asperity.parameters.arguments import rising
 from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.expressions import trapezoids
+from asperity.recording.finding import Finding
 from asperity.recording.roles import candidates, words
-
-if TYPE_CHECKING:
-    from asperity.recording.finding import Finding
-    from asperity.recording.trace import Channel, Trace
-
+from asperity.recording.trace import Channel, Trace
 
 _FEWEST = 32
 #: Names of a force divided by the weight, and what its unit measures if one is known.

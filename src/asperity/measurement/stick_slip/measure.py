@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,11 +25,7 @@ from asperity.questions.recording import Measurement as Question
 from asperity.recording.defects.check import saturation
 from asperity.recording.defects.levels import CROWDED, coarsely_rounded, recorder_step
 from asperity.recording.defects.sampling import even_rate
-from asperity.recording.trace import Channel
-
-if TYPE_CHECKING:
-    from asperity.recording.trace import Trace
-
+from asperity.recording.trace import Channel, Trace
 
 _DEFAULTS = Question()
 #: With this number of events or fewer there is no regime, and means have no spread.

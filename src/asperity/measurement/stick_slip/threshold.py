@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,17 +46,6 @@ _FARTHEST = 0.4
 
 #: Final regimes of the motion below the threshold.
 _STICKING = "regular", "irregular", "growing", "oscillation"
-
-#: Columns as `asperity recipe` takes them, and the bracket.
-COLUMNS = (
-    "V",
-    "K_over_W0",
-    "K_over_W0_err",
-    "frequency",
-    "frequency_err",
-    "sticks_at",
-    "slides_at",
-)
 
 
 @dataclass(frozen=True)
@@ -89,6 +78,10 @@ class Threshold:
     sticks_at: float
     slides_at: float
     reason: str
+
+
+#: Columns as `asperity recipe` takes them, and the bracket.
+COLUMNS = tuple(field.name for field in fields(Threshold) if field.name != "reason")
 
 
 def linear_frequency(events: SlipEvents, loading: float) -> tuple[float, float]:
