@@ -30,19 +30,13 @@ except ImportError:  # Windows has no such limits
     resource = None  # type: ignore[assignment]
 
 
-def set_limits(limits: Mapping[str, int]) -> None:
-    """Limit address space (``memory``, bytes) and processor time (``seconds``) of the process.
+@contextlib.contextmanager
+def limited(limits: Mapping[str, int]) -> Iterator[None]:
+    """Limit address space (``memory``, bytes) and processor time (``seconds``) within a block.
 
     Both are in addition to what the process has used so far. The system ends the process after its
     time, and refuses further memory.
     """
-    for kind, end in _limit_values(limits).items():
-        resource.setrlimit(kind, (end, end))
-
-
-@contextlib.contextmanager
-def limited(limits: Mapping[str, int]) -> Iterator[None]:
-    """`set_limits` within a block."""
     ends = _limit_values(limits)
     earlier = {kind: resource.getrlimit(kind) for kind in ends}
     for kind, end in ends.items():
@@ -143,8 +137,7 @@ def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Even
             send(**message)
 
     try:
-        set_limits(request.get("limits") or {})
-        with naming(in_labels):
+        with limited(request["limits"]), naming(in_labels):
             try:
                 send(result=_function(request["job"])(request["argument"], report), done=True)
             except InputError as error:
