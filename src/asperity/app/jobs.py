@@ -44,8 +44,7 @@ class Jobs:
         self._preload = (preload, *laws)
         self._free = asyncio.Lock()
         self._waiting = 0
-        self._idle: list[_Worker] = []
-        self._alive: set[_Worker] = set()
+        self._worker: _Worker | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._closed = False
 
@@ -87,13 +86,11 @@ class Jobs:
         if self._closed:
             self._free.release()
             return
-        worker = None
         finished = False
         clock = asyncio.get_running_loop().time
         end = clock() + seconds
         try:
-            worker = self._idle_worker() or await _Worker.start(self._preload, self._folder)
-            self._alive.add(worker)
+            worker = await self.prepare()
             await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
             while not finished:
                 try:
@@ -106,7 +103,7 @@ class Jobs:
                 yield message or {"error": _why_it_ended(limits), "done": True}
         finally:
             # The client may be gone, and this task cancelled: another task takes over the worker.
-            self._start_task(self._release(worker, reusable=not limits, finished=finished))
+            self._start_task(self._release(reusable=not limits, finished=finished))
 
     def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
         """Run a coroutine in the background; `close` waits for its end."""
@@ -114,54 +111,45 @@ class Jobs:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _idle_worker(self) -> _Worker | None:
-        while self._idle:
-            worker = self._idle.pop()
-            if worker.running:
-                return worker
-        return None
-
-    async def _release(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
-        """Keep a worker for the next job if its job is done or stops when cancelled.
+    async def _release(self, *, reusable: bool, finished: bool) -> None:
+        """Keep the worker for the next job if its job is done or stops when cancelled.
 
         A worker that had limits is replaced by a new worker, which imports its modules at once.
         """
         try:
-            if worker is not None:
-                if reusable and worker.running and (finished or await worker.stop_job()):
-                    self._idle.append(worker)
-                else:
-                    worker.kill()
-                    self._alive.discard(worker)
-                    await worker.ended()
-                    if not reusable and not self._closed:
-                        await self.prepare()
+            worker = self._worker
+            kept = reusable and worker is not None and worker.running
+            if not (kept and worker and (finished or await worker.stop_job())):
+                await self._end_worker()
+            if not (reusable or self._closed):
+                await self.prepare()
         finally:
             self._free.release()
 
-    async def prepare(self, warm: str | None = None) -> None:
-        """Start a worker for the first job, and run `warm` in it in the background."""
-        worker = await _Worker.start(self._preload, self._folder)
-        self._alive.add(worker)
-        self._idle.append(worker)
+    async def prepare(self, warm: str | None = None) -> _Worker:
+        """Start a worker, unless one runs, and let it run `warm` in the background."""
+        if self._worker is None or not self._worker.running:
+            self._worker = await _Worker.start(self._preload, self._folder)
         if warm is not None:
             self._start_task(self._warm(warm))
+        return self._worker
+
+    async def _end_worker(self) -> None:
+        if self._worker is not None:
+            await self._worker.end()
 
     async def _warm(self, job: str) -> None:
         async for _ in self.run(job, {}):
             pass
 
     async def close(self) -> None:
-        """End all workers, and wait until they have ended."""
+        """End the worker, and wait until it has ended."""
         self._closed = True
-        for worker in self._alive:
-            worker.kill()
+        await self._end_worker()
         while self._tasks:  # a task that ends may start another task
             # `gather` of tasks that have all ended would not let the loop remove them from the set.
             await asyncio.wait(self._tasks)
-        for worker in self._alive:  # a worker may have started in the meantime
-            worker.kill()
-        await asyncio.gather(*(worker.ended() for worker in self._alive))
+        await self._end_worker()  # one that has started in the meantime
 
 
 class _Worker:
@@ -220,8 +208,9 @@ class _Worker:
         await self._process.wait()
         self._lines.put_nowait(b"")
 
-    async def ended(self) -> None:
-        """Wait until the process has ended and its pipes are closed."""
+    async def end(self) -> None:
+        """End the process at once, and wait until its pipes are closed."""
+        self.kill()
         await self._reader
         if self._process.stdin is not None:
             self._process.stdin.close()
@@ -231,17 +220,12 @@ class _Worker:
     async def stop_job(self) -> bool:
         """Ask the job to stop, and return whether it did within `_PATIENCE`."""
         await self.send({"cancel": True})
-
-        async def until_done() -> bool:
-            while (message := await self.read()) is not None:
-                if message.get("done"):
-                    return True
-            return False
-
-        try:
-            return await asyncio.wait_for(until_done(), _PATIENCE)
-        except TimeoutError:
-            return False
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_PATIENCE):
+                while (message := await self.read()) is not None:
+                    if message.get("done"):
+                        return True
+        return False
 
     def kill(self) -> None:
         """End the process at once."""
