@@ -242,7 +242,7 @@ def test_a_client_that_does_not_go_on_is_ended(server, ask, monkeypatch, kind):
     with opened(server) as connection:
         connection.sendall(first)
         assert is_ended(connection, again)
-    assert ask("/api/state").status == 200
+    assert ask("/").status == 200
 
 
 def test_a_body_that_comes_as_a_file_is_read_may_take_longer_than_a_pause(server, monkeypatch):
@@ -271,7 +271,7 @@ def test_connections_that_are_held_leave_room(server, ask, monkeypatch, kind):
             held.append(opened(server))
             held[-1].sendall(first)
         for _ in range(3):
-            assert ask("/api/state").status == 200
+            assert ask("/").status == 200
     finally:
         for connection in held:
             connection.close()

@@ -84,9 +84,6 @@ def build(
     preparation = Preparation(tasks)
     use(preparation)
 
-    async def state(request: Request) -> Response:
-        return _json(to_json(preparation.state()))
-
     async def whole_catalogue(request: Request) -> Response:
         return _json(catalogue.as_json())
 
@@ -95,7 +92,6 @@ def build(
 
     routes += [
         Route("/", page),
-        Route("/api/state", state),
         Route("/api/catalogue", whole_catalogue),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]

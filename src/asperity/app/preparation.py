@@ -46,16 +46,6 @@ class Preparation:
                 self.start([name, *waiting])
         return False
 
-    def state(self) -> dict[str, Any]:
-        """Tasks that are done, the current one, and the number of tasks that are not done."""
-        with self._lock:
-            futures = dict(self._futures)
-        return {
-            "ready": sorted(name for name, future in futures.items() if future.done()),
-            "preparing": next((n for n, future in futures.items() if future.running()), None),
-            "left": sum(not future.done() for future in futures.values()),
-        }
-
     def close(self) -> None:
         """Start no further task."""
         self._pool.shutdown(wait=False, cancel_futures=True)
