@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from asperity.cli.options import (
-    material_named,
     material_option,
     option,
     output_options,
@@ -16,6 +15,7 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.report import Output, say
+from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import require, symbol
 from asperity.parameters.arguments import number, one_of
 
@@ -61,6 +61,7 @@ def air(
     The fraction eps_eff/eps of the normal-load modulation that the micro-contacts bear, its phase
     against the load, |gamma R| of the layer and its stiffness.
     """
+    from asperity import materials
     from asperity.air import AirLayer
     from asperity.air.layer import GasFlow
 
@@ -79,7 +80,9 @@ def air(
     unknown, given = {"radius": "R", "gap": "h0"}.get(sought or "", ""), settings_of(settings)
     field, got = f"--set {symbol(unknown)}", f"'{given.get(unknown)}'"
     require(unknown not in given, field, f"be left out with --for {sought}", got, "it is sought")
-    numbers = _numbers(given, material_named(material), vacuum, unknown)
+    with fields_as_options(POINT_OPTIONS):
+        published = None if material is None else materials.load(material)
+    numbers = _numbers(given, published, vacuum, unknown)
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
     layer = None
     if not vacuum:

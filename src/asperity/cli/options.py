@@ -19,7 +19,6 @@ from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
 from asperity.parameters.arguments import at_least, one_of
 
 if TYPE_CHECKING:
-    from asperity.materials import Material
     from asperity.questions.point import Point
 
 Command = Callable[..., Any]
@@ -348,11 +347,3 @@ def point_of(law: str | None, material: str | None, given: dict[str, str]) -> Po
     from asperity.questions.point import Point
 
     return Point(law=law or "", material=material or "", parameters=given)
-
-
-def material_named(name: str | None) -> Material | None:
-    """Load the material, if one is named."""
-    from asperity import materials
-
-    with fields_as_options(POINT_OPTIONS):
-        return None if name is None else materials.load(name)

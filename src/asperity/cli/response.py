@@ -131,7 +131,7 @@ def _point(point: Point, output: Output) -> int:
 
 
 def _record(response: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> dict[str, Any]:
-    """The response of one point for JSON; numbers are None without a converged response."""
+    """The response of one point for JSON; numbers are NaN without a converged response."""
     import numpy as np
 
     from asperity.materials import cited_works
@@ -140,11 +140,9 @@ def _record(response: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> di
     record: dict[str, Any] = {}
     for name in _JSON:
         value = np.asarray(getattr(response, name))
-        if np.iscomplexobj(value):
-            value = np.stack([value.real, value.imag], axis=-1)
-        if value.dtype.kind not in "bOU":
-            value = value.astype(float) if response.converged else np.full(value.shape, None)
-        record |= dict.fromkeys((name, *OUTPUTS[name].former), value.tolist())
+        if value.dtype.kind in "fc" and not response.converged:
+            value = value * np.nan  # both parts of complex numbers
+        record |= dict.fromkeys((name, *OUTPUTS[name].former), value)
     units = point_parameters(type(response.slider.law))
     provenance = response.provenance
     record["provenance"] = {

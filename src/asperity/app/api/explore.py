@@ -30,7 +30,6 @@ from asperity.orbit import (
     over_a_period,
     response_function,
 )
-from asperity.parameters import OUTPUTS
 
 #: Numbers of harmonics and of instants of the period, and of amplitudes and frequencies of curves.
 _HARMONICS, _INSTANTS, _AMPLITUDES, _FREQUENCIES = 8, 256, 24, 80
@@ -254,8 +253,6 @@ def _prepare(name: str, amplitudes: tuple[float, ...]) -> None:
         solve(name, values, epsilon, methods=_FAST, **_KEPT)
     _fast_curve(question, name, question.amplitudes())
 
-
-assert set(_CURVES) <= set(OUTPUTS)
 
 ENDPOINTS = (
     Answer("explore", Explored, explore),
