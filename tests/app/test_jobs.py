@@ -9,19 +9,19 @@ import pytest
 from asperity.app.jobs import Jobs
 from asperity.app.worker import limited
 
-JOB = "asperity.app.api.recordings:"
+JOB = "asperity.app.api.unruly:"
 #: A law outside the package.
 COMPOSITE = Path(__file__).parents[2] / "examples" / "composite_law.py"
 
 
 @pytest.fixture
 def with_jobs(monkeypatch, tmp_path):
-    """Call a coroutine function with `Jobs` whose workers know `unruly_jobs`."""
+    """Call a coroutine function with `Jobs` whose workers know `unruly_jobs`, and laws if any."""
+    monkeypatch.setattr("asperity.app.jobs._PATIENCE", 0.1)
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=":")
 
-    def run(work):
+    def run(work, *laws):
         async def whole():
-            laws = (f"{COMPOSITE}:Composite",)
             jobs = Jobs(preload="unruly_jobs", laws=laws, folder=tmp_path)
             try:
                 return await work(jobs)
@@ -45,7 +45,7 @@ def test_workers_know_laws_and_the_folder_that_the_server_was_given(with_jobs, t
     async def work(jobs):
         return [(await messages(jobs, job))[-1]["result"] for job in ("laws", "place")]
 
-    laws, place = with_jobs(work)
+    laws, place = with_jobs(work, f"{COMPOSITE}:Composite")
     assert {"rice-ruina", "composite"} <= set(laws)
     assert place == str(tmp_path)
 
