@@ -107,26 +107,44 @@ def barriers():
     return of
 
 
+@pytest.fixture(scope="session")
+def pages(chromium):
+    """Blank pages, which are used again, by whether they bypass the policy on content."""
+    return {False: [], True: []}
+
+
 @pytest.fixture
-def visit(chromium, server):
+def visit(chromium, server, pages):
     """Open a view of the page; a request to another host or a failing script is an error."""
     opened, fetched, failed = [], [], []
     origin = f"http://127.0.0.1:{server.port}"
+    listeners = {
+        "request": lambda request: fetched.append(request.url),
+        "pageerror": lambda error: failed.append(str(error)),
+        "console": lambda m: failed.append(m.text) if m.type == "error" else None,
+    }
 
-    def open_page(fragment="", width=1280, height=900, **options):
-        page = chromium.new_page(viewport={"width": width, "height": height}, **options)
+    def open_page(fragment="", width=1280, height=900, *, bypass_csp=False, **media):
+        blank = pages[bypass_csp]
+        page = blank.pop() if blank else chromium.new_page(bypass_csp=bypass_csp)
         page.set_default_timeout(300_000)
-        page.on("request", lambda request: fetched.append(request.url))
-        page.on("pageerror", lambda error: failed.append(str(error)))
-        page.on("console", lambda m: failed.append(m.text) if m.type == "error" else None)
+        page.set_viewport_size({"width": width, "height": height})
+        usual = {"media": "screen", "color_scheme": "light", "reduced_motion": "no-preference"}
+        page.emulate_media(**usual | media)
+        for event, listener in listeners.items():
+            page.on(event, listener)
+        opened.append((page, blank))
         page.goto(f"{origin}/{fragment}")
-        opened.append(page)
         return page
 
     yield open_page
-    for page in opened:
-        page.close()
-    allowed = (f"{origin}/", "data:image/", f"blob:{origin}/")
+    for page, blank in opened:
+        page.evaluate("localStorage.clear()")
+        page.goto("about:blank")
+        for event, listener in listeners.items():
+            page.remove_listener(event, listener)
+        blank.append(page)
+    allowed = (f"{origin}/", "data:image/", f"blob:{origin}/", "about:blank")
     assert [url for url in fetched if not url.startswith(allowed)] == []
     # The page itself shows why a request is refused; Chromium reports it as well.
     assert [text for text in failed if "status of 400" not in text] == []
