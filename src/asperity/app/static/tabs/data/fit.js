@@ -20,8 +20,6 @@ const SETTINGS = {
   prior: false, profile: false, inertia: false, report: false, posterior: false, draws: "1000", chains: "4",
   trend: "linear", drift: false, initial: "steady", gauge: "", fit_rate: "",
 };
-const FLAGS = ["prior", "profile", "inertia", "report", "drift", "posterior"];
-const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "fit_rate", "draws", "chains"];
 const LABELS = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", mu1: "μ₁", mu2: "μ₂" };
 
 export class FitPanel {
@@ -61,8 +59,9 @@ export class FitPanel {
       const { laws } = this.page.catalogue;
       if (Array.isArray(kept.laws)) this.settings.laws = kept.laws.filter((n) => laws[n]?.rate_dependent);
       if (Array.isArray(kept.free)) this.settings.free = kept.free.filter((n) => typeof n === "string");
-      for (const n of TEXTS) if (typeof kept[n] === "string") this.settings[n] = kept[n];
-      for (const n of FLAGS) this.settings[n] = kept[n] === true;
+      for (const [n, usual] of Object.entries(SETTINGS)) {
+        if (!Array.isArray(usual) && typeof kept[n] === typeof usual) this.settings[n] = kept[n];
+      }
     } catch {
       // A link that was cut: the default settings.
     }
