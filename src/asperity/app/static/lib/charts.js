@@ -125,12 +125,18 @@ export class Figure {
     return paired ? PRINTED / 2 - 20 : PRINTED;
   }
 
-  /** Position of an event in units of the axes of its row; null outside. */
-  at(event) {
+  /** Position of an event in px, and the number of its row; -1 outside of all rows. */
+  #place(event) {
     const box = this.plot.getBoundingClientRect();
     const [px, py] = [event.clientX - box.left, event.clientY - box.top];
-    const frame = this.frames?.find((f) => px >= f.left && px <= f.right && py >= f.top && py <= f.bottom);
-    return frame ? [frame.x.back(px), frame.y.back(py)] : null;
+    const inside = (f) => px >= f.left && px <= f.right && py >= f.top && py <= f.bottom;
+    return [px, py, this.frames ? this.frames.findIndex(inside) : -1];
+  }
+
+  /** Position of an event in units of the axes of its row; null outside. */
+  at(event) {
+    const [px, py, k] = this.#place(event);
+    return k < 0 ? null : [this.frames[k].x.back(px), this.frames[k].y.back(py)];
   }
 
   /** Let the mouse drag over a stretch of x. A finger scrolls the page. */
@@ -139,7 +145,7 @@ export class Figure {
     let from = null;
     const inside = (event) => {
       const { left, right } = this.frames[0];
-      return Math.max(left, Math.min(right, event.clientX - this.plot.getBoundingClientRect().left));
+      return Math.max(left, Math.min(right, this.#place(event)[0]));
     };
     const show = (event) => {
       const ends = [from, inside(event)].sort((a, b) => a - b);
@@ -168,9 +174,8 @@ export class Figure {
   }
 
   #hover(event) {
-    const text = event && this.frames ? this.#under(event) : "";
-    const box = this.plot.getBoundingClientRect();
-    this.#show(text, event && event.clientX - box.left, event && event.clientY - box.top);
+    const [px, py, k] = event ? this.#place(event) : [0, 0, -1];
+    this.#show(k < 0 ? "" : this.#under(px, py, k), px, py);
   }
 
   #show(text, x, y) {
@@ -183,12 +188,7 @@ export class Figure {
     this.readout.style.top = `${Math.max(0, y - this.readout.offsetHeight - 10)}px`;
   }
 
-  #under(event) {
-    const box = this.plot.getBoundingClientRect();
-    const px = event.clientX - box.left;
-    const py = event.clientY - box.top;
-    const k = this.frames.findIndex((f) => py >= f.top && py <= f.bottom && px >= f.left && px <= f.right);
-    if (k < 0) return "";
+  #under(px, py, k) {
     const frame = this.frames[k];
     const row = this.chart.rows[k];
     if (row.readout) return row.readout(frame.x.back(px), frame.y.back(py));
