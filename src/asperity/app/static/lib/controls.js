@@ -6,6 +6,21 @@ import { nameOf, symbolOf } from "./words.js";
 
 const STEPS = 400;
 
+/** The text of a value in SI, or a text that only the server understands. */
+const textOf = (value, { kind }) => (typeof value === "number" ? quantity(value, kind, 4) : value);
+
+/** What is written in a field of a number, in SI if the page knows the unit. */
+const valueOf = (field, { kind }) => parse(field.value, kind) ?? field.value.trim();
+
+/** A field for a number, and the label of what has an id: by default symbol and meaning of the parameter. */
+function numberField(parameter, id, attributes, label) {
+  const symbol = parameter.symbol ? formula(symbolOf(parameter)) : parameter.name;
+  return [
+    el("label", { for: id, title: parameter.meaning }, label || [symbol, el("span", { class: "meaning" }, parameter.meaning)]),
+    el("input", { type: "text", class: "number", spellcheck: "false", autocomplete: "off", ...attributes }),
+  ];
+}
+
 /**
  * A slider with a field for its number.
  *
@@ -21,27 +36,18 @@ export class Quantity {
       type: "range", id, min: 0, max: STEPS, step: 1,
       input: () => this.#moved(),
     });
-    this.field = el("input", {
-      type: "text", class: "number", spellcheck: "false", autocomplete: "off", inputmode: "text",
-      "aria-label": `${parameter.meaning}, with its unit`,
-      change: () => this.#written(),
-      keydown: (event) => { if (event.key === "Enter") this.#written(); },
+    const [label, field] = numberField(parameter, id, {
+      "aria-label": `${parameter.meaning}, with its unit`, change: () => this.#written(),
     });
-    this.element = el(
-      "div", { class: "quantity" },
-      el("label", { for: id, title: parameter.meaning },
-        parameter.symbol ? formula(symbolOf(parameter)) : parameter.name,
-        el("span", { class: "meaning" }, parameter.meaning)),
-      this.field, this.range,
-    );
+    this.field = field;
+    this.element = el("div", { class: "quantity" }, label, field, this.range);
     this.set(slider.value);
   }
 
   /** Show a value in SI without calling `onInput`. */
   set(value) {
     this.value = value;
-    this.field.value = typeof value === "number" ? quantity(value, this.parameter.kind, 4) : value;
-    this.field.removeAttribute("aria-invalid");
+    this.field.value = textOf(value, this.parameter);
     if (typeof value !== "number") return;
     this.range.value = Math.round(STEPS * this.#fraction(value));
     this.range.setAttribute("aria-valuetext", this.field.value);
@@ -70,7 +76,7 @@ export class Quantity {
   }
 
   #written() {
-    const value = parse(this.field.value, this.parameter.kind) ?? this.field.value.trim();
+    const value = valueOf(this.field, this.parameter);
     if (value === this.value) return;
     this.set(value);
     this.onInput(value);
@@ -119,21 +125,16 @@ export class Dock {
 /** A field for a number, without a slider. */
 export function entry({ parameter, value, onInput, label }) {
   const id = fresh("entry");
-  const text = (v) => (typeof v === "number" ? quantity(v, parameter.kind, 4) : v);
-  const field = el("input", {
-    type: "text", class: "number", id, spellcheck: "false", autocomplete: "off",
-    "aria-label": label ? parameter.meaning : false,
+  const [caption, field] = numberField(parameter, id, {
+    id, "aria-label": label ? parameter.meaning : false,
     change: () => {
-      const written = parse(field.value, parameter.kind) ?? field.value.trim();
-      field.value = text(written);
+      const written = valueOf(field, parameter);
+      field.value = textOf(written, parameter);
       onInput(written);
     },
-  });
-  field.value = text(value);
-  return el("div", { class: "entry" },
-    el("label", { for: id, title: parameter.meaning },
-      label || [parameter.symbol ? formula(symbolOf(parameter)) : parameter.name, el("span", { class: "meaning" }, parameter.meaning)]),
-    field);
+  }, label);
+  field.value = textOf(value, parameter);
+  return el("div", { class: "entry" }, caption, field);
 }
 
 /** A box to tick. */
