@@ -446,13 +446,16 @@ class LockInTerm(DataTerm):
         poor start if a minimiser returns from a step that was too long.
         """
 
-        def distance(visited: Mapping[str, float]) -> float:
-            pairs = [(visited.get(n, v), v) for n, v in free.items()]
-            return sum(((a - b) / max(abs(a), abs(b), 1e-300)) ** 2 for a, b in pairs)
-
+        now = np.array(list(free.values()))
+        pairs = [[f.get(n, v) for n, v in free.items()] for f, _ in self._visited]
+        visited = np.reshape(pairs, (-1, len(free)))
+        largest = np.maximum(np.maximum(np.abs(visited), np.abs(now)), 1e-300)
+        squares = np.sum(((visited - now) / largest) ** 2, axis=-1)
         result = KnownOrbits(self.table.rows)
-        for visited, known in sorted(self._visited, key=lambda pair: distance(pair[0])):
-            result.complete(known, near=distance(visited) < _NEAR**2)
+        for k in np.argsort(squares, kind="stable"):
+            result.complete(self._visited[k][1], near=bool(squares[k] < _NEAR**2))
+            if result.known.all():
+                break
         return result
 
 
