@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 import runpy
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.recording import read
 from asperity.recording.readers.from_file import reader_points
@@ -65,19 +64,11 @@ def test_a_file_of_another_package_is_recognised_and_read(package, recording):
         assert trace.provenance["format"] == "gaugebox"
 
 
-def test_the_command_line_takes_the_format(tmp_path, recording):
-    folder = tmp_path / "installed"
-    folder.mkdir()
-    installed(folder, "gaugebox = lab_reader")
-    shutil.copy(EXAMPLE, folder)
-    path = os.pathsep.join([str(folder), str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(
-        [sys.executable, "-m", "asperity", "measure", recording, "--format", "gaugebox", "--json"],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": path},
-    )
-    assert done.returncode == 0, done.stderr
+def test_the_command_line_takes_the_format(package, recording):
+    package("gaugebox = lab_reader", lab_reader=EXAMPLE.read_text())
+    arguments = ["measure", str(recording), "--format", "gaugebox", "--json"]
+    done = CliRunner().invoke(main, arguments, catch_exceptions=False)
+    assert done.exit_code == 0, done.stderr
     record = json.loads(done.stdout)
     assert record["mu1"] == pytest.approx(0.05 / 7, rel=1e-2)
     assert record["provenance"]["format"] == "gaugebox"
