@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 
 import h5py
@@ -436,8 +437,11 @@ def test_a_group_can_be_chosen_by_each_of_its_names(tmp_path, planted):
     assert len(read(path, group="best")) == 200
 
 
-def test_groups_of_any_depth_are_read(tmp_path, planted):
-    path, depth = tmp_path / "a.h5", 1010  # more than Python recurses
+def test_groups_of_any_depth_are_read(tmp_path, planted, request):
+    path, depth = tmp_path / "a.h5", 400  # twice as many as Python recurses here
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(len(inspect.stack(context=0)) + depth // 2)
+    request.addfinalizer(lambda: sys.setrecursionlimit(limit))
     with h5py.File(path, "w") as file:
         group = file
         for _ in range(depth):
