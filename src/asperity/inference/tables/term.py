@@ -445,7 +445,6 @@ class LockInTerm(DataTerm):
         A call starts from these orbits and replaces them. The orbits of the last call would be a
         poor start if a minimiser returns from a step that was too long.
         """
-
         now = np.array(list(free.values()))
         pairs = [[f.get(n, v) for n, v in free.items()] for f, _ in self._visited]
         visited = np.reshape(pairs, (-1, len(free)))
