@@ -53,17 +53,16 @@ def test_the_keyboard_reads_the_values_of_a_chart(visit, explored):
 def test_tabs_are_links_and_come_back_as_they_were(visit):
     page = opened(visit)
     page.get_by_label("Law", exact=True).select_option("linker-dieterich")
-    page.get_by_role("link", name="Map").click()
-    page.locator("section.tab.map").wait_for()
-    # The address of Explore, which is written with a delay, does not take the place of Map's.
+    page.get_by_role("link", name="Data").click()
+    page.locator("section.tab.data").wait_for()
+    # The address of Explore, which is written with a delay, does not take the place of Data's.
     page.wait_for_timeout(400)
-    assert "#map" in page.url
+    assert "#data" in page.url
     page.get_by_role("link", name="Explore").click()
-    # Map has a law too, until the address has changed.
     explore = page.locator("section.tab.explore")
     assert explore.get_by_label("Law", exact=True).input_value() == "linker-dieterich"
     page.go_back()
-    page.locator("section.tab.map").wait_for()
+    page.locator("section.tab.data").wait_for()
 
 
 def test_a_wrong_number_is_told_in_a_sentence_and_undone(visit):
