@@ -649,7 +649,9 @@ def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, bar
     # 200 samples of a noise of 3e-4 leave standard errors of A, B and D0 of 0.8, 0.5 and 0.7 %.
     assert estimates == pytest.approx(PLANTED, rel=0.03)
     assert estimates["A"] - estimates["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
-    assert fit.locator(".panel.run-1 .plot path.line").count() == 3
+    lines = fit.locator(".panel.run-1 .plot path.line")
+    lines.nth(2).wait_for(state="attached")  # drawn once the panel has a width
+    assert lines.count() == 3
     assert not fit.get_by_role("button", name="Cancel").is_visible()
     # The numbers of the fit are moved by hand, and the link restores them.
     page.locator("summary", has_text="by hand").click()
