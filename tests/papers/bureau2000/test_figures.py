@@ -28,6 +28,10 @@ def test_every_figure_with_curves_is_computed_and_described(figures):
         words = WORDS.figure(figure, {})
         assert words.caption
         assert words.alt
+        with style():
+            drawn = words.draw()
+            drawn.set_layout_engine("none")
+            drawn.draw_without_rendering()
     for figure in over_amplitude(figures):
         assert not figure.data[["V", "epsilon_eff", "mean_friction", "mu1"]].isna().any().any()
 
