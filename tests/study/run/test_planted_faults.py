@@ -251,7 +251,7 @@ def can_have(plant: Plant, file: str) -> bool:
 
 
 @pytest.mark.parametrize("plant", [*ANY, *DESCRIPTION])
-@draws(2, 4)
+@draws(1, 4)
 def test_a_planted_fault_is_repaired_or_refused(
     whole: Whole, tmp_path: Path, plant: Plant, draws: int
 ) -> None:
