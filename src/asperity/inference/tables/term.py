@@ -447,7 +447,7 @@ class LockInTerm(DataTerm):
         """
         now = np.array(list(free.values()))
         pairs = [[f.get(n, v) for n, v in free.items()] for f, _ in self._visited]
-        visited = np.reshape(pairs, (-1, len(free)))
+        visited = np.reshape(pairs, (len(pairs), len(free)))
         largest = np.maximum(np.maximum(np.abs(visited), np.abs(now)), 1e-300)
         squares = np.sum(((visited - now) / largest) ** 2, axis=-1)
         result = KnownOrbits(self.table.rows)
