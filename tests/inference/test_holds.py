@@ -50,7 +50,7 @@ def table(exact, healing, **more):
 
 @pytest.fixture(scope="module")
 def fitted(exact, noise):
-    return fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=4)
+    return fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=2)
 
 
 def test_the_numbers_come_back(fitted):

@@ -71,7 +71,7 @@ def test_any_start_ends_with_numbers_or_a_reason(law):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD).states[0]
     for states in starts(len(steady), 8, LAWS.index(law), steady):
-        assert_ended(slider, HOLD, initial=states, most_steps=1e5)
+        assert_ended(slider, HOLD, initial=states, most_steps=2e4)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_any_start_with_inertia_or_damping_ends_with_numbers_or_a_reason(law, op
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD, **options).states[0]
     for states in starts(len(steady), 6, 7, steady):
-        assert_ended(slider, HOLD, initial=states, most_steps=1e5, **options)
+        assert_ended(slider, HOLD, initial=states, most_steps=2e4, **options)
 
 
 @pytest.mark.parametrize(
