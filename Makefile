@@ -37,9 +37,8 @@ quick test test-long: export PYTHONPYCACHEPREFIX = $(abspath $(VENV))/bytecode
 quick: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -n 2 -m quick
 
-# A third process uses two cores while others wait for a browser or for programs that they start.
 test: $(VENV)/test.stamp
-	$(BIN)/python -m pytest -n 3
+	$(BIN)/python -m pytest -n 2
 
 test-long: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -n 2 -m long
