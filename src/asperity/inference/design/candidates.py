@@ -28,7 +28,7 @@ from asperity.slider.parameters import slider_from
 
 Progress = Callable[[int, int, str], None]
 
-#: Points per call of a solver; progress is reported after each call.
+#: Points per call of the compiled derivatives; progress is reported after each call.
 _BLOCK = 128
 #: Reason why a point with a periodic response is no candidate.
 UNSTABLE = "its periodic response is unstable: stick-slip"
@@ -151,28 +151,24 @@ def _reasons(
 ) -> NDArray[np.str_]:
     """Reasons why points have no stable response, shape (n,); empty where they have one."""
     given = on_contacts({**plan.truth.fixed, **points, **values})
-    beyond = given["epsilon"] >= 1
-    reasons = np.where(beyond, "contact would be lost", "").astype(object)
-    left = np.flatnonzero(~beyond)
-    for start in range(0, left.size, _BLOCK):
-        block = left[start : start + _BLOCK]
-        some = {n: v[block] if np.ndim(v) else v for n, v in given.items()}
-        response = periodic_response(
-            slider_from(plan.truth.law, some),
-            velocity=some["V"],
-            epsilon=some["epsilon"],
-            frequency=some["frequency"],
-            inertia=plan.question.inertia,
-            radiation_damping=some["eta"] if plan.question.radiation_damping else None,
-            harmonics=2,
-        )
-        converged, stable, texts = (
-            np.broadcast_to(a, block.shape)
-            for a in (response.converged, response.stable, response.result)
-        )
-        for i, ok, steady, text in zip(block, converged, stable, texts, strict=True):
-            reasons[i] = _short(str(text)) if not ok else "" if steady else UNSTABLE
-        progress(start + block.size, left.size)
+    reasons = np.full(len(points["V"]), "contact would be lost", dtype=object)
+    kept = given["epsilon"] < 1
+    if not kept.any():
+        return reasons
+    some = {n: v[kept] if np.ndim(v) else v for n, v in given.items()}
+    response = periodic_response(
+        slider_from(plan.truth.law, some),
+        velocity=some["V"],
+        epsilon=some["epsilon"],
+        frequency=some["frequency"],
+        inertia=plan.question.inertia,
+        radiation_damping=some["eta"] if plan.question.radiation_damping else None,
+        harmonics=2,
+        progress=progress,
+    )
+    failed = [_short(str(text)) for text in response.result]
+    steady = np.where(response.stable, "", UNSTABLE)
+    reasons[kept] = np.where(response.converged, steady, failed)
     return reasons
 
 
