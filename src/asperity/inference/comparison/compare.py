@@ -217,22 +217,24 @@ def compare(
     """
     rule = "be two or more"
     require(len(set(laws)) >= 2, "laws", rule, ", ".join(laws) or "none", "name those to compare")
+    laws = tuple(dict.fromkeys(laws))
     # Only parameters of laws: the fit checks those of machine and runs, and unknown names.
     of_any_law = {p for law in registered() for p in _parameters(law)}
     of_these = {p for law in laws for p in _parameters(law)}
+    of_others = {law: of_these - set(_parameters(law)) for law in laws}
     nobodys = [p for p in free or () if p in of_any_law - of_these]
     if nobodys:
         rule = "be parameters of the laws that are compared"
-        got = f"'{symbol(nobodys[0])}', which none of {', '.join(dict.fromkeys(laws))} has"
+        got = f"'{symbol(nobodys[0])}', which none of {', '.join(laws)} has"
         raise InputError("free", rule, got, "leave it out, or add a law with it")
     several = listed_data(data, options.get("runs") or RunOptions())
     free_by_law = {
         name: (
             free_by_default(get_law(name), several, options.get("fixed"), options.get("material"))
             if free is None
-            else _applicable(name, free, laws)
+            else [p for p in free if p not in of_others[name]]
         )
-        for name in dict.fromkeys(laws)
+        for name in laws
     }
     # Each law takes the numbers that it has; an empty mapping means the same as None.
     given = {key: options.pop(key, None) or {} for key in ("fixed", "start", "prior")}
@@ -258,7 +260,7 @@ def compare(
         ordered = [pair for pair in ordered if before is None or pair[0] in before]
         for k, (name, names) in enumerate(ordered):
             mine: dict[str, Any] = {
-                key: {n: values[n] for n in _applicable(name, list(values), laws)}
+                key: {n: value for n, value in values.items() if n not in of_others[name]}
                 for key, values in given.items()
             }
             if before and before[name].converged:
@@ -472,12 +474,6 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
 
 def _parameters(law: str) -> Collection[str]:
     return law_parameters(get_law(law))
-
-
-def _applicable(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
-    others = {p for law in laws for p in _parameters(law)}
-    known = _parameters(name)
-    return [p for p in free if p in known or p not in others]
 
 
 def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
