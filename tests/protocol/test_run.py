@@ -21,6 +21,7 @@ from asperity.protocol import (
     write_csv,
 )
 from asperity.recording.readers import read
+from references.populations import population
 
 ROWS = 300
 
@@ -73,7 +74,7 @@ def test_the_file_says_where_it_comes_from(short, whole) -> None:
         assert run.time.attrs["units"] == "s"
 
 
-@pytest.mark.parametrize("limit", [0.25, 0.55])
+@pytest.mark.parametrize("limit", population([0.25, 0.55]))
 def test_an_interrupted_run_goes_on_to_the_same_file(short, whole, tmp_path, limit) -> None:
     out = tmp_path / "run.nc"
     with pytest.raises(Interrupted, match="--resume") as caught:
@@ -352,45 +353,46 @@ def test_a_recording_needs_even_samples(write) -> None:
         load_protocol(write(TABLE, **{'sampling = "2 kHz"': ""}))
 
 
-CELL = """
+RATE = """
 [tribometer]
 rate = "1 kHz"
-
+"""
+CELL = """
 [tribometer.sensors."{channel}"]
 type = "{kind}"
 bandwidth = "1 kHz"
 """
 
 
-@pytest.mark.parametrize(
-    ("channel", "measures", "variable"),
-    [
-        ("shear force", "shear force", "force"),
-        ("normal force", "normal load", "load"),
-        ("cell 2", None, "load"),
-        ("cell 3", "shear force", "force"),
-    ],
-)
-def test_what_a_load_cell_measures_is_a_field(write, tmp_path, channel, measures, variable) -> None:
-    table = CELL.format(channel=channel, kind="load cell")
-    protocol = load_protocol(write(table + (f"measures = '{measures}'\n" if measures else "")))
-    done = run_protocol(protocol, tmp_path / "run.nc")
-    trace = record_run(protocol.setup, done.out)
-    expected = getattr(protocol.trajectory(), variable)[0]
-    assert trace.channels[channel].values[:50].mean() == pytest.approx(expected, rel=1e-6)
+def test_what_a_load_cell_measures_is_a_field(write, whole) -> None:
+    cells = {
+        "shear force": ("shear force", "force"),
+        "normal force": ("normal load", "load"),
+        "cell 2": (None, "load"),
+        "cell 3": ("shear force", "force"),
+    }
+    table = RATE
+    for channel, (measures, _) in cells.items():
+        table += CELL.format(channel=channel, kind="load cell")
+        table += f"measures = '{measures}'\n" if measures else ""
+    trace = record_run(load_protocol(write(table)).setup, whole)
+    with xarray.open_dataset(whole) as run:
+        for channel, (_, variable) in cells.items():
+            read = trace.channels[channel].values[:50].mean()
+            assert read == pytest.approx(float(run[variable][0]), rel=1e-6)
 
 
 def test_a_load_cell_by_the_name_of_a_shear_force_has_to_say_what_it_measures(write) -> None:
     with pytest.raises(InputError, match="must be given for a load cell in a channel of this name"):
-        load_protocol(write(CELL.format(channel="shear force", kind="load cell")))
-    table = CELL.format(channel="F", kind="spring gauge") + "stiffness = '1 N/um'\n"
+        load_protocol(write(RATE + CELL.format(channel="shear force", kind="load cell")))
+    table = RATE + CELL.format(channel="F", kind="spring gauge") + "stiffness = '1 N/um'\n"
     path = write(table + "measures = 'normal load'\n")
     with pytest.raises(InputError, match="must be something that a spring gauge can measure"):
         load_protocol(path)
 
 
 def test_the_load_point_moves_as_the_drive_does(write, tmp_path) -> None:
-    table = CELL.format(channel="load point", kind="displacement gauge")
+    table = RATE + CELL.format(channel="load point", kind="displacement gauge")
     protocol = load_protocol(write(table + "measures = 'load-point displacement'\n"))
     done = run_protocol(protocol, tmp_path / "run.nc")
     trace = record_run(protocol.setup, done.out)

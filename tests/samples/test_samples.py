@@ -1,5 +1,7 @@
 """Sample recordings hold what their protocols say."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -8,10 +10,20 @@ from asperity.errors import InputError
 from references.populations import population
 
 
+@cache
+def recorded(name: str, seed: int = 0):
+    return asp.samples.record(name, seed)
+
+
+@cache
+def measured(name: str, seed: int = 0):
+    return asp.measure(recorded(name, seed))
+
+
 def test_a_velocity_step_changes_steady_friction_by_a_minus_b() -> None:
     truth = asp.samples.truth("velocity_steps")
     expected = (truth["A"].value - truth["B"].value) * np.log(10.0)
-    steps = asp.measure(asp.samples.velocity_steps(seed=4)).steps
+    steps = measured("velocity_steps").steps
     assert len(steps) == 4
     for step, sign in zip(steps, (1, -1, 1, -1), strict=True):
         # Twice the half-width of 95 %: four standard errors and more.
@@ -19,7 +31,7 @@ def test_a_velocity_step_changes_steady_friction_by_a_minus_b() -> None:
 
 
 def test_the_load_of_the_modulated_sample_is_that_of_its_protocol() -> None:
-    reading = asp.measure(asp.samples.modulated(seed=2)).reading
+    reading = measured("modulated").reading
     assert reading.frequency == pytest.approx(120.0, rel=1e-6)
     # The load cell has a bandwidth of 5 kHz, its recorder one of 800 Hz.
     assert reading.epsilon == pytest.approx(0.24, rel=1e-3)
@@ -27,7 +39,7 @@ def test_the_load_of_the_modulated_sample_is_that_of_its_protocol() -> None:
 
 
 def test_the_same_seed_makes_the_same_recording_and_another_seed_another() -> None:
-    one, same, other = (asp.samples.modulated(seed) for seed in (1, 1, 2))
+    one, same, other = recorded("modulated"), asp.samples.modulated(), asp.samples.modulated(1)
     force = [trace.channels["shear force"].values for trace in (one, same, other)]
     np.testing.assert_array_equal(force[0], force[1])
     assert np.any(force[0] != force[2])
@@ -49,7 +61,7 @@ def test_a_name_or_seed_that_is_none_is_named() -> None:
 
 def test_the_stick_slip_sample_loads_as_its_spring_says_and_slips_for_half_a_period() -> None:
     truth = {name: number.value for name, number in asp.samples.truth("stick_slip").items()}
-    trace = asp.samples.stick_slip(seed=1)
+    trace = recorded("stick_slip")
     result = asp.measure(trace, stiffness=truth["K"], velocity="100 um/s", mass=truth["M"])
     assert result.kind in ("regular stick-slip", "irregular stick-slip")
     # The joint is a second spring in series with the first: K/(1 + lambda K/W0).
@@ -68,7 +80,7 @@ def test_the_stick_slip_sample_loads_as_its_spring_says_and_slips_for_half_a_per
 @pytest.mark.parametrize("name", ["velocity_steps", "slide_hold_slide", "modulated", "stick_slip"])
 def test_no_check_doubts_what_the_virtual_tribometer_has_recorded(name: str, seed: int) -> None:
     """Once, a hold was cut off in the middle of a block: seven of twelve slide-hold-slides."""
-    checks = asp.measure(asp.samples.record(name, seed)).checks
+    checks = measured(name, seed).checks
     assert [check for check in checks if check.verdict != "ok"] == []
 
 

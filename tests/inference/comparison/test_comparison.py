@@ -4,7 +4,7 @@ import json
 import math
 import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,9 +25,11 @@ from asperity.errors import InputError
 from asperity.inference import answers, compare, fit, table_of
 from asperity.inference.comparison.compare import judge, laws_table
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
+from asperity.inference.fitting import minima
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.residuals import outlying_rows
+from asperity.inference.tables.term import LockInTerm
 from asperity.laws import get_law
 from asperity.orbit import response_function
 from asperity.recording.defects.autoregression import Autoregression
@@ -71,7 +73,7 @@ def judged(made, pmma):
         special = [name for law in laws for name in SPECIAL.get(law, ())]
         free = [*special, "eps_ratio", "A"]
         table = made(*args, **options)
-        return compare(table, laws, free, material=pmma, evidence=False, starts=4)
+        return compare(table, laws, free, material=pmma, evidence=False, starts=1)
 
     return judge_it
 
@@ -102,9 +104,12 @@ def test_a_law_with_more_parameters_than_samples_allow_leaves_the_others(tmp_pat
     assert "at least 64 samples" in comparison.not_compared["two-state"]
 
 
-@pytest.mark.parametrize("law", population(["linker-dieterich", "elasto-plastic"]))
-def test_the_law_of_the_data_is_found(judged, law):
-    comparison = judged(law, 1)
+@pytest.mark.parametrize(
+    ("law", "laws"),
+    population([("elasto-plastic", LAWS[::2]), *((law, LAWS) for law in LAWS[1:])], several=True),
+)
+def test_the_law_of_the_data_is_found(judged, law, laws):
+    comparison = judged(law, 1, laws=laws)
     assert comparison.decided
     assert comparison.best == law
     assert all(j.excluded == (name != law) for name, j in comparison.laws.items())
@@ -146,8 +151,9 @@ def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judge
     assert fits[0].chi2 == pytest.approx(fits[1].chi2, rel=1e-9)
 
 
-def test_errors_too_small_exclude_no_law_by_their_size(judged):
-    comparison = judged("rice-ruina", 3, claimed=1 / 3, laws=LAWS[:2])
+def test_errors_too_small_exclude_no_law_by_their_size(judged, monkeypatch):
+    monkeypatch.setattr(minima, "_FURTHER", 0)
+    comparison = judged("rice-ruina", 3, claimed=1 / 3, laws=LAWS[::2])
     assert not comparison.decided
     assert "too small by a factor of about 3" in comparison.verdict
     # No other stiffness would describe these data.
@@ -156,14 +162,14 @@ def test_errors_too_small_exclude_no_law_by_their_size(judged):
     assert not any(j.excluded for j in comparison.laws.values())
 
 
-def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma):
+def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma, monkeypatch):
+    monkeypatch.setattr(minima, "_FURTHER", 0)
     table, wrong = made("rice-ruina", 2), 1.3 * pmma.K
-    comparison = compare(
-        table, LAWS[:2], FREE[1:], material=pmma, evidence=False, fixed={"K": wrong}, starts=4
-    )
+    given = {"material": pmma, "fixed": {"K": wrong}, "starts": 1}
+    comparison = compare(table, LAWS[:2], FREE[1:], evidence=False, **given)
     assert not comparison.decided
     assert "With K free, rice-ruina describes these data" in comparison.verdict
-    alone = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma, fixed={"K": wrong})
+    alone = fit(table, "rice-ruina", ["eps_ratio", "A"], **given)
     (said,) = [w for w in alone.warnings if "with K free" in w]
     low, high = map(float, re.search(r"\((\S+) to (\S+), 95 %\)", said).groups())
     # Four standard errors, printed to four digits.
@@ -197,8 +203,10 @@ def integral_of(density, middle, reach):
 
 
 def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
-    result = fit(made("elasto-plastic", 7), "elasto-plastic", ("eps_ratio",), material=pmma)
-    evidence = evidence_of(result)
+    result = fit(
+        made("elasto-plastic", 7), "elasto-plastic", ("eps_ratio",), material=pmma, starts=1
+    )
+    evidence = evidence_of(result, samples=400)
     prior = evidence.prior["eps_ratio"]
     assert prior["kind"] == "uniform in the logarithm"
     width = math.log(prior["high"] / prior["low"])
@@ -212,17 +220,18 @@ def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
     integral = integral_of(density, middle, reach)
     expected = result.log_likelihood + math.log(integral)
     assert evidence.log == pytest.approx(expected, abs=5 * evidence.standard_error + 1e-3)
-    assert evidence.effective_samples > 300
+    assert evidence.effective_samples > 120
 
 
 def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
     table = made("elasto-plastic", 8)
     runs = np.where(V < 5e-6, "slow", "fast")
     table = replace(table, run=runs)
-    result = fit(table, "elasto-plastic", ("eps_ratio",), material=pmma)
+    given = {"material": pmma, "starts": 1}
+    result = fit(table, "elasto-plastic", ("eps_ratio",), **given)
     validation = leave_one_run_out(result)
     parts = [
-        fit(table.without(runs != n), "elasto-plastic", ("eps_ratio",), material=pmma)
+        fit(table.without(runs != n), "elasto-plastic", ("eps_ratio",), **given)
         for n in ("slow", "fast")
     ]
     # By quadrature: the mean density of the run over the posterior of the others.
@@ -249,12 +258,13 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
     assert "one run" in validation.message
 
 
-def test_second_opinions_stand_beside_the_verdict(made, pmma):
+def test_second_opinions_stand_beside_the_verdict(made, pmma, monkeypatch):
+    monkeypatch.setattr(LockInTerm, "affordable", 200)
     table = made("rice-ruina", 9)
     done = []
     count = {"progress": lambda *steps: done.append(steps)}
     comparison = compare(
-        table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, starts=4, **count
+        table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, starts=1, **count
     )
     assert done == sorted(done)
     assert done[-1] == (400, 400)
@@ -267,7 +277,7 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     table = made("rice-ruina", 2)
     with pytest.raises(InputError, match="got 'lambda', which none of rice-ruina, linker-d"):
         compare(table, ("rice-ruina", "linker-dieterich"), ("lambda",), material=pmma)
-    given = {"material": pmma, "fixed": {"eps_ratio": 0.48}, "starts": 1}
+    given = {"material": pmma, "fixed": {"eps_ratio": 0.48}, "starts": 1, "evidence": False}
     comparison = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), **given)
     assert set(comparison.laws) == {"rice-ruina", "elasto-plastic"}
     bare = comparison.laws["rice-ruina"]
@@ -279,11 +289,11 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     away = (exact.delta_mu - table.values["delta_mu"]) / MEAN
     assert bare.fit.observables["delta_mu"] == (pytest.approx(away @ away, rel=1e-6), V.size)
     assert bare.fit.dof == 5 * V.size
-    assert bare.evidence.log == bare.fit.log_likelihood
+    assert evidence_of(bare.fit).log == bare.fit.log_likelihood
     # A material with a prior of the other law alone, as a fit of that law writes it.
     of_lambda = pmma["lambda"].model_copy(update={"uncertainty": 0.1})
     given["prior"] = pmma.model_copy(update={"numbers": {"lambda": of_lambda}})
-    again = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), evidence=False, **given)
+    again = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), **given)
     assert again.laws["rice-ruina"].fit.chi2 == bare.fit.chi2
     assert again.laws["elasto-plastic"].fit.parameters["lambda"].prior.source == pmma.name
 
@@ -306,9 +316,10 @@ def test_a_law_with_too_few_data_for_its_aicc_is_not_compared(made, pmma):
 
 
 def test_a_law_without_an_aicc_is_not_compared(judged, monkeypatch):
-    def without_aicc(data, law, *args, **options):
-        result = fit(data, law, *args, **options)
-        return replace(result, aicc=math.inf) if law == "elasto-plastic" else result
+    def without_aicc(data, law, free, **options):
+        options["start"] = {}
+        result = fit(data, "rice-ruina", ("eps_ratio", "A"), **options)
+        return replace(result, law=law, aicc=math.inf if law == "elasto-plastic" else result.aicc)
 
     monkeypatch.setattr("asperity.inference.comparison.compare.fit", without_aicc)
     comparison = judged("rice-ruina", 2)
@@ -336,7 +347,7 @@ def spoiled_table(made, seed, *, outliers):
 @draws(1, 6)
 def test_outliers_that_hide_each_other_are_named_and_left_out(made, pmma, outliers, draws):
     right = 0
-    for seed in range(draws):
+    for seed in range(2, 2 + draws):
         law, table, rows = spoiled_table(made, seed, outliers=outliers)
         free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(law, ())]
         result = fit(table, law, free, material=pmma, check_stiffness=False)
@@ -351,9 +362,9 @@ def test_outliers_that_hide_each_other_are_named_and_left_out(made, pmma, outlie
     assert right >= draws - 1
 
 
-@draws(1, 6)
-def test_clean_tables_have_no_outliers_even_under_a_wrong_law(made, pmma, draws):
-    for seed in range(draws):
+@pytest.mark.long
+def test_clean_tables_have_no_outliers_even_under_a_wrong_law(made, pmma):
+    for seed in range(6):
         _, table, _ = spoiled_table(made, seed, outliers=0)
         for other in LAWS:
             free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(other, ())]
@@ -377,10 +388,10 @@ def test_a_row_at_the_edge_of_periodic_sliding_is_no_outlier():
     "drawn",
     population(
         [
+            ("elasto-plastic", 111, fast_point),
             ("linker-dieterich", 27, fast_point),
             ("linker-dieterich", 51, fast_point),
             ("linker-dieterich", 23, fast_point),
-            ("elasto-plastic", 111, fast_point),
             ("linker-dieterich", 13, slow_point),
         ]
     ),
@@ -416,9 +427,13 @@ def test_ends_of_profiles_with_searched_orbits_have_the_rise_of_their_level():
 @pytest.mark.parametrize(
     "start", population([("--start", "eps_ratio=0.5", "--start", "lambda=0.6 um"), ()])
 )
-def test_the_command_leaves_outliers_out(made, tmp_path, start):
+def test_the_command_leaves_outliers_out(made, tmp_path, monkeypatch, start):
     """Options of the command line go to the second round of fits, as to the first."""
-    law, table, rows = spoiled_table(made, 2, outliers=2)
+    if start:
+        monkeypatch.setattr(minima, "_FURTHER", 0)
+        few = partial(compare, starts=1, evidence=False)
+        monkeypatch.setattr("asperity.inference.answers.compare_loaded", few)
+    law, table, rows = spoiled_table(made, 2, outliers=1 if start else 2)
     columns = {"V": table.points["V"], "epsilon": table.points["epsilon"]}
     columns["frequency"] = table.points["frequency"]
     for name in table.values:

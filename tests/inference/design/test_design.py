@@ -34,7 +34,7 @@ PLAN = {
 
 @pytest.fixture(scope="module")
 def result():
-    return design(PLAN, simulate=60)
+    return design(PLAN, simulate=30)
 
 
 def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(result):
@@ -64,10 +64,10 @@ def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(result):
 
 def test_simulated_fits_spread_as_expected(result):
     simulation = result.simulation
-    assert simulation.sets == 60
+    assert simulation.sets == 30
     assert simulation.failed == 0
     for name, error in result.parameters.items():
-        # Three standard errors of the spread of 60 fits, some 10 % each.
+        # Three standard errors of the spread of 30 fits, some 15 % each.
         assert simulation.spread[name] == pytest.approx(
             error.se, abs=3 * simulation.uncertainty[name]
         )
@@ -180,7 +180,7 @@ def test_a_law_that_gives_the_same_readings_is_not_to_be_excluded():
 
 def test_a_rival_at_a_bound_of_its_parameters_is_excluded_as_its_misfit_says():
     """Its chi-squared lies far beyond what noise can change."""
-    result = design(ONE_POINT, simulate=5)
+    result = design(ONE_POINT, simulate=2)
     assert result.chi2 > 1e4
     assert result.probability == result.simulation.decided == 1
     assert result.fewer == pytest.approx(1)
