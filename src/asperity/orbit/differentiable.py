@@ -131,7 +131,7 @@ class ResponseFunction:
         """
         padded, points = self._padded(parameters)
         orbits = self._orbits(padded, points or 1, known, motions=motions)
-        values = _evaluate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        values = _evaluated(padded, orbits)
         return _cut(_with_searched(values, orbits), points)
 
     @typed
@@ -169,11 +169,8 @@ class ResponseFunction:
         """
         padded, points = self._padded(parameters)
         orbits = self._orbits(padded, points or 1, known, every=every, motions=motions)
-        table: Any
-        whole, table = _differentiate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        whole, table = _differentiated(padded, orbits)
         whole = _with_searched(whole, orbits)
-        if not _traced(padded):
-            table = np.array(table)
         outcome = whole.outcome[: points or 1]
         if orbits.searched and (not every or (outcome == Outcome.CONVERGED).all()):
             add_derivatives(table, orbits.program, padded, orbits.searched, names)
@@ -231,11 +228,17 @@ class ResponseFunction:
         if known is not None:
             self._check_known(known, points, traced=traced)
         if traced:
-            fast, wanted = _fast_orbits(program, jax.lax.stop_gradient(parameters))
+            fast = _fast_orbits(program, jax.lax.stop_gradient(parameters))
+            wanted = program.equations.valid(parameters)
+            wanted = wanted if fast is None else wanted & ~fast.converged
             return _Orbits(program, fast, wanted if program.search else None, None)
         spare_mappings()
-        fast, wanted = _fast_orbits(program, parameters)
-        rows, searched = np.asarray(wanted) & (np.arange(len(wanted)) < points), None
+        fast = _fast_orbits(program, parameters)
+        rows, searched = np.arange(len(parameters["V"])) < points, None
+        if fast is not None:
+            left = ~np.asarray(fast.converged)
+            fast = None if left[rows].all() else fast
+            rows &= left
         if program.search and rows.any():
             searched = search_orbits(
                 program.equations,
@@ -428,7 +431,7 @@ class _Orbits(NamedTuple):
     """Orbits of all points, and the program that evaluates them."""
 
     program: Program
-    #: Of the fast method; None without one.
+    #: Of the fast method; None without one, or where it has found none.
     fast: FastOrbits | None
     #: Within a compiled program: mask of the points that are left to the search.
     wanted: Array | None
@@ -436,12 +439,12 @@ class _Orbits(NamedTuple):
     searched: SearchedOrbits | None
 
 
-def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits | None, Array]:
-    """Orbits of the fast method (None without one), and a mask of the points left to the search."""
-    if not has_fast_method(program):
-        return None, program.equations.valid(parameters)
-    fast = fast_orbits(parameters, program=program.without_search)
-    return fast, fast.valid & ~fast.converged
+def _fast_orbits(program: Program, parameters: Parameters) -> FastOrbits | None:
+    return (
+        fast_orbits(parameters, program=program.without_search)
+        if has_fast_method(program)
+        else None
+    )
 
 
 def _with_searched(values: ResponseValues, orbits: _Orbits) -> ResponseValues:
@@ -523,6 +526,31 @@ def _differentiate(
     known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
     # One array: every output of a compiled program costs time.
     return values, known[:, None] * jnp.stack([columns[n] for n in names])
+
+
+def _evaluated(parameters: Parameters, orbits: _Orbits) -> ResponseValues:
+    """Response of the fast orbits, and within compiled programs of the searched ones."""
+    if orbits.fast is None and not _traced(parameters):
+        return _without_orbits(parameters, orbits.program)[0]
+    return _evaluate(parameters, orbits.fast, orbits.wanted, program=orbits.program)
+
+
+def _differentiated(parameters: Parameters, orbits: _Orbits) -> tuple[ResponseValues, Any]:
+    """As `_evaluated`, and derivatives as of `_differentiate`, which may be written to."""
+    if _traced(parameters):
+        return _differentiate(parameters, orbits.fast, orbits.wanted, program=orbits.program)
+    if orbits.fast is None:
+        return _without_orbits(parameters, orbits.program)
+    values, table = _differentiate(parameters, orbits.fast, None, program=orbits.program)
+    return values, np.array(table)
+
+
+def _without_orbits(parameters: Parameters, program: Program) -> tuple[ResponseValues, Float]:
+    """The result of `_differentiate` without an orbit, for which nothing need be compiled."""
+    points, names = len(parameters["V"]), program.equations.names
+    table = np.full((len(names), points, program.columns), np.nan)
+    outcome = np.full(points, int(Outcome.NO_ORBIT))
+    return ResponseValues.of_columns(table[0], outcome, program.harmonics), table
 
 
 #: Points that are differentiated at a time, which bounds the memory.

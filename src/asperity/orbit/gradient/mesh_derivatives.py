@@ -268,7 +268,7 @@ def add_derivatives(
 
     for index, on_mesh in orbits.parts:
         numbers = {n: np.asarray(v)[index] for n, v in parameters.items()}
-        problem = jax.tree.map(np.asarray, equations.problem(numbers))
+        problem = equations.problem(numbers)
         logs = on_mesh.log_multipliers if program.multipliers else None
         inputs, chunk = (problem, on_mesh.orbit, logs), mesh_chunk(problem.system.size)
         for rows, part in run_chunks(derivatives, inputs, np.arange(len(index)), chunk):

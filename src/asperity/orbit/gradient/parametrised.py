@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple
 
 import jax
@@ -101,8 +101,12 @@ class ParametrisedProblem:
         Parameters
         ----------
         parameters : mapping of str to array, shape (points,)
-            All of `names`, in SI.
+            All of `names`, in SI and unchecked.
         """
+        structure, numbers = _numbers_of(self)
+        return jax.tree.unflatten(structure, [k * parameters[name] for name, k in numbers])
+
+    def _built(self, parameters: Mapping[str, Any]) -> Problem:
         slider = slider_from(self.law, parameters)
         drive: tuple[Any, ...] = (slider, parameters["V"], 2 * jnp.pi * parameters["frequency"])
         if self.motion is not QuasiStatic:
@@ -128,18 +132,15 @@ class ParametrisedProblem:
 
     def influential(self, wanted: Collection[str] | None = None) -> tuple[str, ...]:
         """Those of `wanted`, or of all, that have an influence, in the order of `names`."""
-        unit = dict.fromkeys(self.names, np.ones(1))
+        unit = dict.fromkeys(self.names, 1.0)
         known = {*equation_parameters(*self.problem(unit)), *self.load_names}
         return tuple(n for n in self.names if n in known and (wanted is None or n in wanted))
 
-    @lru_cache(maxsize=64)  # noqa: B019 - a handful of equations
     def directions(self, names: tuple[str, ...], points: int) -> Problem:
         """Derivatives of a problem by each of `names`, NumPy arrays (names, points)."""
-        one = np.ones(points)
-        # The numbers of a problem are the parameters times constants.
-        _, push = jax.linearize(self.problem, dict.fromkeys(self.names, one))
-        directions = [push({n: one * (n == name) for n in self.names}) for name in names]
-        return jax.tree.map(lambda *parts: np.stack(parts), *directions)
+        structure, numbers = _numbers_of(self)
+        columns = [k * np.array([n == name for n in names], float) for name, k in numbers]
+        return jax.tree.unflatten(structure, [np.tile(c[:, None], points) for c in columns])
 
     def valid(self, parameters: Mapping[str, Array]) -> Array:
         """Mask of the points whose parameters all obey their rules, shape (points,)."""
@@ -148,6 +149,20 @@ class ParametrisedProblem:
             if parameter.rule != "finite":
                 good.append(RULES[parameter.rule].holds(parameters[name]))
         return jnp.stack(good).all(0)
+
+
+@cache
+def _numbers_of(equations: ParametrisedProblem) -> tuple[Any, list[tuple[str, float]]]:
+    """Structure of a problem, and each of its numbers as a parameter and its constant factor."""
+    one, numbers = dict.fromkeys(equations.names, 1.0), {}
+    with jax.ensure_compile_time_eval():  # also where a program that needs it is traced
+        leaves, structure = jax.tree.flatten(equations._built(one))
+        _, push = jax.linearize(equations._built, one)
+        for name in one:
+            slopes = jax.tree.leaves(push({n: float(n == name) for n in one}))
+            numbers |= {i: (name, float(k)) for i, k in enumerate(slopes) if k}
+    # A number without a parameter is zero.
+    return structure, [numbers.get(i, ("V", 0.0)) for i in range(len(leaves))]
 
 
 def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:

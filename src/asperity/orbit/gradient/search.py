@@ -263,7 +263,7 @@ def search_orbits(
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
-    problem = jax.tree.map(np.asarray, equations.problem(parameters))
+    problem = equations.problem(parameters)
     points, index = len(wanted), np.flatnonzero(wanted)
     result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
 
@@ -334,7 +334,7 @@ def growth_of(
     The arguments are those of `search_orbits`. The growth is ln |m| of the largest multiplier m,
     on `FIRST_MESH` intervals; NaN without an orbit.
     """
-    problem = jax.tree.map(np.asarray, equations.problem(parameters))
+    problem = equations.problem(parameters)
     growth = np.full(len(problem.system.V), np.nan)
     all_points = np.ones(growth.size, bool)
     found = search_orbits(
