@@ -233,7 +233,11 @@ class ResponseFunction:
             wanted = wanted if fast is None else wanted & ~fast.converged
             return _Orbits(program, fast, wanted if program.search else None, None)
         spare_mappings()
-        fast = _fast_orbits(program, parameters)
+        # A direct search does not resolve multipliers.
+        direct = program.search in ("direct", "coarse") and not program.multipliers
+        # The known orbits are those that the fast method did not find at other parameters.
+        searching = direct and known is not None and known.known.all()
+        fast = None if searching else _fast_orbits(program, parameters)
         rows, searched = np.arange(len(parameters["V"])) < points, None
         if fast is not None:
             left = ~np.asarray(fast.converged)
@@ -245,8 +249,7 @@ class ResponseFunction:
                 program.harmonics,
                 {n: np.asarray(v) for n, v in parameters.items()},
                 rows,
-                # A direct search does not resolve multipliers.
-                direct=program.search in ("direct", "coarse") and not program.multipliers,
+                direct=direct,
                 coarse=program.search == "coarse",
                 motions=motions,
                 known=known,

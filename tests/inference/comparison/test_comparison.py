@@ -131,6 +131,8 @@ def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judge
     def missing_once(data, law, *args, **options):
         result = fit(data, law, *args, **options)
         called.append(law)
+        # While the general law is to come, the other one needs no further starts.
+        assert options["further"] == (len(called) > 1)
         if len(called) == 3:
             assert options["starts"] == 0
         if called.count("rice-ruina") > 1 or law != "rice-ruina":
@@ -316,13 +318,18 @@ def test_a_law_with_too_few_data_for_its_aicc_is_not_compared(made, pmma):
 
 
 def test_a_law_without_an_aicc_is_not_compared(judged, monkeypatch):
+    """Nor does the law that it extends do without further starts."""
+    called = []
+
     def without_aicc(data, law, free, **options):
+        called.append((law, options["further"]))
         options["start"] = {}
         result = fit(data, "rice-ruina", ("eps_ratio", "A"), **options)
         return replace(result, law=law, aicc=math.inf if law == "elasto-plastic" else result.aicc)
 
     monkeypatch.setattr("asperity.inference.comparison.compare.fit", without_aicc)
-    comparison = judged("rice-ruina", 2)
+    comparison = judged("rice-ruina", 2, laws=("rice-ruina", "ruina-slip", "elasto-plastic"))
+    assert [further for law, further in called if law == "rice-ruina"] == [False, True]
     assert list(comparison.not_compared) == ["elasto-plastic"]
     assert not comparison.decided
     assert "because there are too few data" in comparison.verdict

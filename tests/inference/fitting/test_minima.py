@@ -570,9 +570,9 @@ def test_larger_uncertainties_that_the_law_contradicts_too_lead_to_no_further_mi
             part.searching = part.smooth = True
             return part
 
-        def counted(objective, start, evaluations=60):
+        def counted(objective, start, evaluations=60, **options):
             calls.append(hasattr(objective.terms[0], "smooth"))
-            return rough_minimum(objective, start, evaluations)
+            return rough_minimum(objective, start, evaluations, **options)
 
         monkeypatch.setattr(Rows, "smoother", smoother)
         monkeypatch.setattr(minima, "_rough_minimum", counted)

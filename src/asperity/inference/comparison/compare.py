@@ -272,6 +272,8 @@ def compare(
             internal: dict[str, Any] = {
                 "bare": True,
                 "simpler": list(done.values()),
+                # The search of a law that extends this one finds its minima too, see below.
+                "further": not _extended(name, dict(ordered[k + 1 :])),
                 "check_stiffness": False,
                 "progress": lambda done, total, k=k: report(k + done / total),
             }
@@ -285,7 +287,9 @@ def compare(
         return done
 
     fits = fits_to(several, report)
-    if missed := _better_at_extension(fits):
+    # A law is searched for further minima by itself if the law that extends it has no fit.
+    alone = {n: f for n, f in fits.items() if _extended(n, not_compared) and not _extended(n, fits)}
+    if missed := alone | _better_at_extension(fits):
         fits |= fits_to(several, lambda _: None, missed)
     if len(fits) < 2:
         rule, reasons = "be two or more that can be fitted to these data", not_compared.values()
@@ -324,6 +328,11 @@ def _require_aicc(fit: Fit) -> None:
         rule, got = "have more data for its AICc", f"{count} for {symbols(fit.parameters)}"
         advice = "give two data more than free parameters"
         raise UnfittableLawError(fit.law, rule, got, advice)
+
+
+def _extended(law: str, others: Iterable[str]) -> bool:
+    """Whether one of the other laws extends a law."""
+    return any(extends(get_law(other), get_law(law)) for other in others)
 
 
 def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:

@@ -61,6 +61,7 @@ def fit(
     starts: Annotated[int, at_least(0)] = 64,
     seed: Annotated[int, at_least(0)] = 0,
     simpler: Sequence[Fit] = (),
+    further: bool = True,
     check_stiffness: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
@@ -104,6 +105,9 @@ def fit(
     simpler : sequence of Fit
         Fits of other laws to the same data. Fits of special cases of this law are starts too:
         Rice-Ruina is a special case of the elasto-plastic law.
+    further : bool
+        Whether to try further starts while no minimum describes a table; not needed if a law of
+        which this one is a special case is fitted to the same data.
     check_stiffness : bool
         Whether to fit a table that the law does not describe again with K free; a warning says at
         which K the law describes it. Recordings with a fixed or shared K are always fitted again.
@@ -150,7 +154,9 @@ def fit(
         searched = compared(coarse) if (coarse := coarser(recordings)) else objective
         if recordings:
             searched = under_drift(searched)
-        minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
+        minima = minima_of(
+            searched, seed, steps.minimised, drawn=starts, simpler=special, further=further
+        )
         return with_noise(objective, minima, searched) if minima and recordings else (minima, True)
 
     cleaner = recordings

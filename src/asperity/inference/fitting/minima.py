@@ -76,6 +76,7 @@ def minima_of(
     *,
     drawn: int = 64,
     simpler: Sequence[Mapping[str, float]] = (),
+    further: bool = True,
 ) -> list[Minimum]:
     """Minima from the given start and from the best of many random starts, best first.
 
@@ -91,6 +92,8 @@ def minima_of(
     simpler : sequence of mapping of str to float
         Values, in SI, of fits of special cases of the law. They are starts too, because a law never
         describes data worse than its special cases.
+    further : bool
+        Whether further starts are tried while no minimum describes a table.
     """
     if not objective.unknowns:
         return _without_free_parameters(objective)
@@ -102,15 +105,19 @@ def minima_of(
         starts = [*special, *_best(objective, drawn_starts, chi2)]
         minima = _minimised_from(objective, starts, progress)
     elif np.isfinite(chi2).sum() >= chi2.size * _RARE:
-        minima = _by_solved_rows(objective, drawn_starts, special, progress)
+        minima = _by_solved_rows(objective, drawn_starts, special, progress, further)
     if not minima:
         objective.use_search(True)
-        minima = _by_few_rows(objective, drawn_starts, special, progress)
+        minima = _by_few_rows(objective, drawn_starts, special, progress, further)
     return _readable(objective, _with_other_lengths(objective, minima))
 
 
 def _by_solved_rows(
-    objective: Objective, drawn: list[Float], known: list[Float], progress: Progress | None
+    objective: Objective,
+    drawn: list[Float],
+    known: list[Float],
+    progress: Progress | None,
+    further: bool,
 ) -> list[Minimum]:
     """Minima of all rows, started at minima of the rows that the fast method solves, best first.
 
@@ -128,7 +135,7 @@ def _by_solved_rows(
         if _describes(objective, beyond, ends):
             return beyond
         objective.use_search(False)
-    for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
+    for start in _further(objective, drawn, chi2, starts)[: _FURTHER * further]:
         if _describes(objective, minima, ends):
             break
         new = _rough_minimum(partial, start)
@@ -182,7 +189,7 @@ def _rough_minima_by_smoother(objective: Objective, starts: Sequence[Float]) -> 
     """
     smoother, before = objective.smoother(), list[Minimum]()
     for start in starts:
-        between = _rough_minimum(smoother, start, _EVALUATIONS // 2)
+        between = _rough_minimum(smoother, start, _EVALUATIONS // 2, negligible=1.0)
         if not math.isfinite(between.chi2) or not _is_new(between, before):
             continue
         before.append(between)
@@ -259,9 +266,16 @@ def _minimised_from(
     return sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2)
 
 
-def _rough_minimum(objective: Objective, start: Float, evaluations: int = _EVALUATIONS) -> Minimum:
-    """The minimum reached from a start, to the coarse tolerance."""
-    return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=evaluations)
+def _rough_minimum(
+    objective: Objective,
+    start: Float,
+    evaluations: int = _EVALUATIONS,
+    negligible: float = 0.0,
+) -> Minimum:
+    """The minimum reached from a start, to the coarse tolerance or a negligible decrease."""
+    return objective.minimise(
+        start, tolerance=_COARSE_TOLERANCE, evaluations=evaluations, negligible=negligible
+    )
 
 
 def _by_few_rows(
@@ -269,6 +283,7 @@ def _by_few_rows(
     drawn: list[Float],
     known: list[Float],
     progress: Progress | None,
+    further: bool,
 ) -> list[Minimum]:
     """Minima of all rows, started at minima of the coarse objective, best first.
 
@@ -280,8 +295,9 @@ def _by_few_rows(
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
-    further = _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]
-    for new in _rough_minima_by_smoother(coarse, [] if _describes(coarse, roughly) else further):
+    further &= not _describes(coarse, roughly)
+    others = _further(objective, drawn, chi2, starts)[: _FURTHER_WITH_SEARCH * further]
+    for new in _rough_minima_by_smoother(coarse, others):
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
         if _describes(coarse, roughly):
