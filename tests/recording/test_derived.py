@@ -228,6 +228,7 @@ def test_roles_and_times_of_the_user_go_before_expressions_of_a_recipe(tmp_path)
     [
         ({"columns": {"F": "Gauge", "force": "Shear"}}, "F.* must be one column.* 'F' and 'force'"),
         ({"columns": {"time": "Tick"}, "rate": "1 Hz"}, "left out next to a sampling rate"),
+        ({"channels": {"time": "Tick * 10"}, "rate": "1 Hz"}, "left out next to a sampling rate"),
         ({"columns": {"F": "Shear"}, "channels": {"force": "Gauge"}}, "'F' and 'force'"),
         ({"channels": {"load": "Gauge", "W": "Shear"}}, "be one .*, got 'load' and 'W'"),
         ({"columns": {"F": 1}, "units": {"F": "N", "Gauge": "kN"}}, "once, got 'N' and 'kN'"),

@@ -278,9 +278,10 @@ def _require_one_each(
         advice = "leave one out; an expression can have the column by its own name"
         require(role not in names, Argument("columns", role), rule, got, advice)
         names[role] = name
-    clock = next((name for name in columns if role_of(name) == "time"), "")
-    rule, got = "be left out next to a sampling rate", shown(columns.get(clock))
-    require(rate is None or not clock, Argument("columns", "time"), rule, got, "give one of them")
+    for kind, given in (("columns", columns), ("channels", channels)):
+        clock = next((name for name in given if role_of(name) == "time"), "")
+        rule, got = "be left out next to a sampling rate", shown(given.get(clock))
+        require(rate is None or not clock, Argument(kind, "time"), rule, got, "give one of them")
 
 
 def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
