@@ -16,6 +16,7 @@ from asperity.arrays import Bool
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
+from asperity.slider.steady_state import steady_state
 
 
 class Motion(eqx.Module):
@@ -95,6 +96,14 @@ class Motion(eqx.Module):
         law = self.slider.law
         mechanical = self.mechanical_states(law.mu_ss(self.V), 1.0, 0.0, Excitation(jnp.ones(())))
         return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))
+
+    def steady_under(self, at: Excitation) -> Array:
+        """States of steady sliding under the load and at the pull of `at`, shape (size, ...)."""
+        law, v = self.slider.law, self.V * at.pull * jnp.ones_like(at.w)
+        state = steady_state(law, v, at.w)
+        friction = law.friction(v, state, at.w)
+        mechanical = self.mechanical_states(friction, at.pull, jnp.log(at.pull), at)
+        return jnp.stack(jnp.broadcast_arrays(*mechanical, *state))
 
     @abstractmethod
     def force(self, Y: Array, at: Excitation) -> Array:

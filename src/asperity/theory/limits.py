@@ -166,14 +166,10 @@ def even_phases(nodes: int) -> np.ndarray:
 
 @partial(jit_large, static_argnames=("nodes",))
 def adiabatic_states(problem: Problem, *, nodes: int) -> Array:
-    """Steady states at even phases, at their pulling velocities; (size, nodes, points)."""
+    """Steady states at even phases, under their loads and pulls; (size, nodes, points)."""
     system, load = problem
-    ones = jnp.ones((nodes, jnp.shape(system.V)[-1]))
-    at = load.at(even_phases(nodes) * ones)
-    law, pull = system.slider.law, at.pull * ones
-    friction = law.mu_ss(system.V * pull)
-    mechanical = system.mechanical_states(friction, pull, jnp.log(pull), at)
-    return jnp.stack([state * ones for state in (*mechanical, *law.steady_state(system.V * pull))])
+    at = load.at(even_phases(nodes) * jnp.ones(jnp.shape(system.V)[-1]))
+    return system.steady_under(at)
 
 
 @jit_large

@@ -10,21 +10,13 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.errors import Argument, InputError, require
-from asperity.laws import Law, State
-from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
 from asperity.parameters.arguments import number, shown, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
 from asperity.transients.equations import SegmentEquations, Tolerances, states_after_jump
 from asperity.transients.events import EventThresholds
 from asperity.transients.integration import NO_LOAD, Checkpoint, Integration
-
-#: Largest number and length of the Newton steps for the states of the law under another load, and
-#: the change below which they end: from an age that is too small a step is one unit of its
-#: logarithm, however far the age is off.
-_STEPS, _LEAP, _STILL = 100_000, 2.0, 1e-12
 
 
 def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Checkpoint:
@@ -144,41 +136,10 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
 @jit_large
 def _steady(first: SegmentEquations, v: Array, w: Array) -> Array:
     """States from `v` (m/s) under the load `w`, over W0, at the beginning of a segment."""
-    motion, law = first.motion, first.motion.slider.law
-    state = _steady_state(law, v, w)
-    pull = v / motion.V
-    at = Excitation(w, pull=pull)
-    friction = law.friction(v, state, w)
-    mechanical = motion.mechanical_states(friction, pull, jnp.log(pull), at)
-    states = jnp.stack(jnp.broadcast_arrays(*mechanical, *state, jnp.zeros(())))
+    motion = first.motion
+    at = Excitation(w, pull=v / motion.V)
+    states = jnp.append(motion.steady_under(at), 0.0)
     return states_after_jump(motion, at, first.at(jnp.zeros(())), states)
-
-
-def _steady_state(law: Law, v: Array, w: Array) -> State:
-    """States of the law at `v` under the load `w`, by Newton's method from those under w = 1."""
-    if not law.state_names:
-        return ()
-    start = jnp.stack([jnp.asarray(s, float) for s in law.steady_state(v)])
-
-    moves = np.array([name == POSITION for name in law.state_names])
-
-    def rates(packed: Array) -> Array:
-        # A position has no steady value: it stays where it is.
-        return jnp.where(moves, packed - start, jnp.stack(law.state_rate(v, v, tuple(packed), w)))
-
-    def step(carry: tuple) -> tuple:
-        packed, _, count = carry
-        value, jacobian = value_and_jacobian(rates, packed)
-        change = jnp.clip(solve_points(jacobian, -value), -_LEAP, _LEAP)
-        return packed + change, jnp.abs(change).max(), count + 1
-
-    def unfinished(carry: tuple) -> Array:
-        _, change, count = carry
-        return (change > _STILL) & (count < _STEPS)
-
-    # Under w = 1 the initial guess is exact to the last digit.
-    result, *_ = jax.lax.while_loop(unfinished, step, (start, jnp.where(w == 1, 0.0, jnp.inf), 0))
-    return tuple(result)
 
 
 #: A slider slips if its velocity exceeds this multiple of the fastest drive.
