@@ -147,6 +147,23 @@ def test_a_bad_row_gets_its_reason_and_costs_no_other(here) -> None:
         assert after == reference
 
 
+def test_a_bad_share_of_epsilon_has_its_own_name(here) -> None:
+    """It was reported as an epsilon that is not a number."""
+    bad = {
+        "half": "eps_ratio must be a finite number, got 'half'",
+        0: "eps_ratio must be positive, got 0",
+        -0.5: "eps_ratio must be positive, got -0.5",
+        1.2 / POINT["epsilon"]: "epsilon times eps_ratio must be at least 0 and below 1, so",
+        "": "converged",
+        0.5: "converged",
+    }
+    row = POINT | {"law": "rice-ruina"}
+    answers, summary = here([row | {"eps_ratio": r} for r in bad], [*COLUMNS, "eps_ratio"])
+    assert summary.failed == 4
+    for answer, reason in zip(answers, bad.values(), strict=True):
+        assert answer["result"].startswith(reason)
+
+
 def test_numbers_that_a_law_does_not_have_are_not_looked_at(here) -> None:
     row = POINT | {"law": "rice-ruina"}
     answers, summary = here([row, row | {"alpha": "n/a", "lambda": -1}])

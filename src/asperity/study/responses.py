@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +55,28 @@ def answers_of_law(
     return answers
 
 
-def solvable(law: type[Law], values: Mapping[str, Float], answers: Answers) -> Index:
-    """Indices of the points that can be solved; `answers` gets the outcome of the others."""
-    wrong = without_mass(values)
+def broken_rules(law: type[Law], values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """What makes points invalid: name of a parameter, or "law", and at which points it does.
+
+    Parameters
+    ----------
+    law : type of Law
+    values : mapping of str to float or array, shape (points,)
+        As for `answers_of_law`.
+    """
     for name, parameter in point_parameters(law).items():
         if name in values:
             with np.errstate(invalid="ignore"):
                 holds = RULES[parameter.rule].holds(values[name])
-            wrong = wrong | ~(np.isfinite(values[name]) & holds)
+            yield name, ~(np.isfinite(values[name]) & holds)
+    yield "M", without_mass(values)
     if not law.rate_dependent:
-        wrong = wrong | (values["inertia"] > 0) | (values["eta"] > 0)
+        yield "law", (values["inertia"] > 0) | (values["eta"] > 0)
+
+
+def solvable(law: type[Law], values: Mapping[str, Float], answers: Answers) -> Index:
+    """Indices of the points that can be solved; `answers` gets the outcome of the others."""
+    wrong = np.any([at for _, at in broken_rules(law, values)], axis=0)
     answers.fail(wrong, Outcome.INVALID)
     sound = np.flatnonzero(~wrong)
     lowest = lowest_loads({n: v[sound] for n, v in values.items()})

@@ -34,7 +34,7 @@ from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, req
 from asperity.parameters.arguments import counted, shown
 from asperity.parameters.columns import cell_number, headings, sheet
 from asperity.study.points import Answers, Points
-from asperity.study.responses import answers_of_law
+from asperity.study.responses import answers_of_law, broken_rules
 
 Row = list[str]
 
@@ -123,7 +123,9 @@ def _solved(
     table: TableSource, rows: Sequence[Row], advance: Callable[[int], None]
 ) -> tuple[Answers, list[str]]:
     """Answers of rows, and the column ``result``."""
-    results = [_mistake_of_width(row, len(table.header)) for row in rows]
+    results = [
+        _mistake_of_width(row, len(table.header)) or table.mistake_of_share(row) for row in rows
+    ]
     sound = [i for i, result in enumerate(results) if not result]
     advance(len(rows) - len(sound))
     points = _points(table, [rows[i] for i in sound])
@@ -255,6 +257,13 @@ class TableSource:
             rule, got = f"fill a cell of {self.path}", "a number in every row"
             require(name not in full, field, rule, got, "leave it out, or the column")
         require_influence(given, {**self.filled, **dict.fromkeys(self.columns, 1.0)})
+
+    def mistake_of_share(self, row: Row) -> str:
+        """Why the share of epsilon of a row is invalid; empty for other rows."""
+        cell = self._cell(row, EPS_RATIO.name) if EPS_RATIO.name in self.columns else ""
+        share = _number(cell, EPS_RATIO) * self.units.get(EPS_RATIO.name, 1.0)
+        valid = not cell or 0 < share < math.inf
+        return "" if valid else _mistake_of_number(EPS_RATIO, EPS_RATIO.name, share, cell)
 
     def law_of(self, row: Row) -> str:
         """Name of the law of a row, or "" if it has none."""
@@ -388,28 +397,35 @@ def _number(cell: str, parameter: Parameter) -> float:
 
 
 def _mistake(law: type[Law], values: Mapping[str, float], cells: Mapping[str, str]) -> str:
-    """Why the numbers of a row are invalid; empty if they are not."""
-    for name, parameter in point_parameters(law).items():
-        if math.isnan(values[name]):
-            return (
-                f"{law.name} must have {name}, got an empty cell; fill it in or name a material "
-                "that has it"
-            )
-        if math.isinf(values[name]):
-            unit = f" in {parameter.unit}" if parameter.unit else ""
-            return (
-                f"{name} must be a finite number{unit}, got '{cells.get(name)}'; write it without "
-                "unit, with a decimal point"
-            )
-        try:
-            parameter.check(values[name], name)
-        except InputError as error:
-            return str(error)
-    if values["inertia"] > 0 and not values["M"] > 0:
-        return "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
-    if not law.rate_dependent and (values["inertia"] > 0 or values["eta"] > 0):
+    """Why the numbers of a row are invalid."""
+    name = next(name for name, wrong in broken_rules(law, values) if wrong)
+    if name == "law":
         return (
             f"law must depend on the velocity where inertia or eta counts, got {law.name}; leave "
             "both cells empty or choose another law"
         )
+    if math.isnan(values[name]):
+        return (
+            f"{law.name} must have {name}, got an empty cell; fill it in or name a material "
+            "that has it"
+        )
+    shared = name == "epsilon" and EPS_RATIO.name in cells
+    label = f"{name} times {EPS_RATIO.name}" if shared else name
+    return _mistake_of_number(
+        point_parameters(law)[name], label, values[name], cells.get(name, "")
+    ) or ("M must be positive where inertia is 1, got 0; fill it in or name a material with it")
+
+
+def _mistake_of_number(parameter: Parameter, label: str, value: float, cell: str) -> str:
+    """Why the value of a cell is none of its parameter; empty for other cells."""
+    if math.isinf(value):
+        unit = f" in {parameter.unit}" if parameter.unit else ""
+        return (
+            f"{parameter.name} must be a finite number{unit}, got '{cell}'; write it without unit, "
+            "with a decimal point"
+        )
+    try:
+        parameter.check(value, label)
+    except InputError as error:
+        return str(error)
     return ""
