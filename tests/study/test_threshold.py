@@ -7,8 +7,10 @@ from scipy.integrate import solve_ivp
 import asperity as asp
 from asperity import materials
 from asperity.errors import InputError
+from asperity.laws import get_law
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales, stiffness_threshold
+from asperity.theory.memory import critical_stiffness
 
 PMMA = materials.load("bureau2000")
 SLIDERS = {
@@ -33,6 +35,17 @@ def test_without_modulation_the_thresholds_are_the_closed_forms() -> None:
     )
     expected = PMMA.D0 / (PMMA.D0 + PMMA.A * PMMA.lambda_)
     assert float(elastic.ratio) == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_second_state_counts_in_the_scale_of_the_search() -> None:
+    """B < A < B + B2 was refused as a law that strengthens with velocity."""
+    numbers = {"mu0": 0.5, "A": 0.01, "B": 0.006, "D0": 4e-7, "V0": 1e-6, "B2": 0.012, "D2": 3e-6}
+    slider = asp.Slider(get_law("two-state")(**numbers), spring=1e5, load=7.0)
+    Kc, _ = natural_scales(slider, "1 um/s")
+    assert Kc == pytest.approx(7.0 * critical_stiffness(slider.law, 1e-6), rel=1e-9)
+    stable = asp.Slider(get_law("two-state")(**numbers | {"B2": 0.001}), spring=1e5, load=7.0)
+    with pytest.raises(InputError, match=r"between must be given where .* any stiffness"):
+        stiffness_threshold(stable, velocity=1e-6, epsilon=0.0, frequency=120.0)
 
 
 def test_where_there_is_no_threshold_the_result_says_on_which_side() -> None:

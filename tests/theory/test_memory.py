@@ -51,6 +51,34 @@ def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
     assert memory.critical_stiffness(loaded, 3e-12) == pytest.approx((B - A) / D0, rel=1e-8)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"B": 0.5 * A, "B2": 1.5 * A, "D2": 7 * D0},  # weakening by the second state alone
+        {"B": 1.6 * A, "B2": -0.7 * A, "D2": 9 * D0},  # strengthening, yet unstable
+        {"B": 0.5 * A, "B2": 0.2 * A, "D2": 3 * D0},  # stable at any stiffness
+        {"B": B, "B2": 0.0, "D2": D0 / 5},
+    ],
+)
+def test_the_threshold_of_two_states_is_where_their_equations_lose_stability(change):
+    law = TwoState(**(NUMBERS | change))
+    closed = memory.sliding_threshold({"A": A, "D0": D0, **change})
+    expected = memory.critical_stiffness(law, V0)
+    assert max(float(closed.stiffness), 0.0) == pytest.approx(expected, rel=1e-9)
+    a1, product = A - change["B"] - change["B2"], D0 * change["D2"]
+    a2 = A * (D0 + change["D2"]) - change["B"] * change["D2"] - change["B2"] * D0
+    k = float(closed.stiffness)
+    cubic = [A * product, a2 + k * product, a1 + k * (D0 + change["D2"]), k]
+    leading = np.roots(cubic)[np.argmax(np.roots(cubic).real)] if k > 0 else 0.0
+    assert abs(leading.imag) == pytest.approx(float(closed.wavenumber), rel=1e-9)
+
+
+def test_the_threshold_of_one_state_is_that_of_the_paper():
+    closed = memory.sliding_threshold({"A": A, "B": np.array([B, 0.5 * A]), "D0": D0})
+    np.testing.assert_allclose(closed.stiffness, [(B - A) / D0, -0.5 * A / D0], rtol=1e-15)
+    np.testing.assert_allclose(closed.wavenumber, [np.sqrt((B - A) / A) / D0, 0.0], rtol=1e-14)
+
+
 def test_several_interfaces_are_refused_in_one_sentence():
     with pytest.raises(InputError, match=r"law\.A must be one number, got an array"):
         memory.critical_stiffness(law("rice-ruina", A=np.array([0.008, 0.01])), V0)

@@ -78,7 +78,7 @@ class ThresholdTable(Record):
     Attributes
     ----------
     between : pair of float
-        Limits of the search, in units of K_c = (B - A) W0/D0 of the same point.
+        Limits of the search, in units of K_c of unmodulated sliding at the same point.
     scan : int
         Number of stiffnesses solved before the search, at equal ratios.
     """

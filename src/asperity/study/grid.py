@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from asperity.laws import get_law
-from asperity.parameters import Parameter, all_parameters
+from asperity.parameters import Parameter, all_parameters, point_parameters
 from asperity.parameters.arguments import shown
 from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import Column, SweepAxis
@@ -138,9 +138,14 @@ class SweepGrid:
             for name, column in axis.rows(part.start, part.stop).items():
                 along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
                 columns[name] = np.array(np.broadcast_to(along, shape)).ravel()
+        of_law = {law: point_parameters(get_law(law)) for law in self.record["laws"]}
         for name, ratio in RATIOS.items():
             if name in columns:
-                needed = {n: columns.get(n, np.full(count, np.nan)) for n in (name, *ratio.needs)}
+                none = np.full(count, np.nan)
+                needed = {n: columns.get(n, none) for n in (name, *ratio.needs)}
+                for n in ratio.counts:
+                    has = [n in of_law[law] for law in columns["law"]]
+                    needed[n] = np.where(has, columns.get(n, none), np.nan)
                 with np.errstate(all="ignore"):
                     columns[ratio.target] = ratio.solve(needed)
         return Points(columns.pop("law"), data=columns.pop("data", None), values=columns)

@@ -23,6 +23,7 @@ from asperity.operating_point import known_parameters
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import OUTPUTS, Output, Parameter, point_parameters
 from asperity.parameters.arguments import shown
+from asperity.theory.memory import sliding_threshold
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
 #: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).
@@ -83,12 +84,26 @@ class Ratio:
         The other parameters in the definition of the ratio.
     solve : callable
         Maps the values of the point, with the ratio, to the target in SI.
+    counts : tuple of str
+        Further parameters, which count where the law of the point has them; NaN elsewhere.
     """
 
     parameter: Parameter
     target: str
     needs: tuple[str, ...]
     solve: Callable[[Mapping[str, Float]], Float]
+    counts: tuple[str, ...] = ()
+
+
+def critical_stiffness(p: Mapping[str, Any]) -> Float:
+    """K_c (N/m) of unmodulated sliding on rigid asperities; not positive where there is none.
+
+    Parameters
+    ----------
+    p : mapping of str to array
+        A, B, D0 and W0 by name, and B2 and D2 of a law with a second state.
+    """
+    return sliding_threshold(p).stiffness * p["W0"]
 
 
 def _dimensionless(name: str, aliases: tuple[str, ...], meaning: str, symbol: str) -> Parameter:
@@ -104,12 +119,13 @@ RATIOS: Mapping[str, Ratio] = MappingProxyType(
             _dimensionless(
                 "stiffness_ratio",
                 ("K/Kc", "K/K_c"),
-                "spring stiffness over the critical one of rigid asperities, K/((B - A) W0/D0)",
+                "spring stiffness over the critical one of rigid asperities, (B - A) W0/D0",
                 "K/K_c",
             ),
             "K",
             ("A", "B", "D0", "W0"),
-            lambda p: p["stiffness_ratio"] * (p["B"] - p["A"]) * p["W0"] / p["D0"],
+            lambda p: p["stiffness_ratio"] * critical_stiffness(p),
+            ("B2", "D2"),
         ),
         "slip_ratio": Ratio(
             _dimensionless(
@@ -144,6 +160,7 @@ class SweepOutcome(IntEnum):
     UNSTABLE_THROUGHOUT = 61
     NO_CROSSING = 62
     NO_RESPONSE = 63
+    NO_SCALE = 64
     STOPPED = 70
     REFUSED = 71
     NO_SAMPLES = 72
@@ -176,6 +193,10 @@ _SENTENCES = {
     SweepOutcome.NO_RESPONSE: (
         "no periodic response at some of the stiffnesses of the scan, the first of them "
         "{detail:.4g} K_c"
+    ),
+    SweepOutcome.NO_SCALE: (
+        "no threshold was searched for: its limits are multiples of K_c, and without modulation "
+        "sliding is stable at any stiffness, or has no K_c in closed form"
     ),
     SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
     SweepOutcome.REFUSED: (

@@ -22,8 +22,9 @@ from asperity.parameters.arguments import at_least, broadcast_shape, number, typ
 from asperity.slider import Slider, equation_of_motion
 from asperity.slider.parameters import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
-from asperity.study.points import POINT_BYTES, Answers, SweepOutcome
+from asperity.study.points import POINT_BYTES, Answers, SweepOutcome, critical_stiffness
 from asperity.study.responses import answers_of_law, bifurcation_kinds
+from asperity.theory.memory import sliding_threshold
 
 #: What happens at a threshold.
 BIFURCATIONS = ("fold", "period doubling", "Neimark-Sacker")
@@ -40,9 +41,8 @@ class StiffnessThreshold:
     K : array, shape (...)
         The stiffness (N/m); NaN without a threshold.
     ratio : array, shape (...)
-        K/K_c, with K_c = (B - A) W0/D0 of unmodulated Rice-Ruina sliding on rigid asperities; NaN
-        also for a law without A, B and D0. Of `nagata`, `two-state`, `cut-off` and
-        `strength-area` unmodulated sliding is unstable below another stiffness:
+        K/K_c, with K_c from `natural_scales`; NaN also for a law without A, B and D0. Of `nagata`,
+        `cut-off` and `strength-area` unmodulated sliding is unstable below another stiffness:
         `asperity.theory.memory.critical_stiffness` has it over W0.
     kind : str array, shape (...)
         "fold", "period doubling" or "Neimark-Sacker".
@@ -61,10 +61,11 @@ class StiffnessThreshold:
 
 @typed
 def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, float]:
-    """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of Rice-Ruina sliding.
+    """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, on rigid asperities.
 
     K_c = (B - A) W0/D0 and f_c = sqrt((B - A)/A) V/(2 pi D0), Eqs. (18) and (19) of
-    Bureau et al. (2000).
+    Bureau et al. (2000); for a law with a second state see
+    `asperity.theory.memory.sliding_threshold`.
 
     Parameters
     ----------
@@ -83,9 +84,8 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     require({"A", "B", "D0"} <= set(law_parameters(type(slider.law))), "law", rule, got, advice)
     p = _numbers(slider)
     V = number(velocity, "velocity", "velocity", "positive")
-    excess = p["B"] - p["A"]
-    frequency = np.sqrt(max(excess, 0.0) / p["A"]) * V / (2 * np.pi * p["D0"])
-    return excess * p["W0"] / p["D0"], float(frequency)
+    frequency = sliding_threshold(p).wavenumber * V / (2 * np.pi)
+    return float(critical_stiffness(p)), float(frequency)
 
 
 @typed
@@ -166,7 +166,7 @@ def stiffness_threshold(
     texts = [text.replace(" K_c", " N/m").replace("threshold.", "") for text in searched.result]
     return StiffnessThreshold(
         K=K,
-        ratio=K / critical,
+        ratio=K / (critical if critical > 0 else np.nan),
         kind=kinds.reshape(shape),
         mode_frequency=searched["mode_frequency"].reshape(shape),
         result=np.array(texts, dtype=object).reshape(shape),
@@ -274,7 +274,8 @@ def _numbers(slider: Slider) -> dict[str, float]:
 def _ends(critical: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
     """Limits of the search (N/m), in ascending order."""
     if between is None:
-        rule, advice = "be given for a law that strengthens with velocity", "give two stiffnesses"
+        rule = "be given where unmodulated sliding is stable at any stiffness"
+        advice = "give two stiffnesses"
         require(not critical <= 0, "between", rule, f"none and K_c = {critical:g} N/m", advice)
         return _BETWEEN[0] * critical, _BETWEEN[1] * critical
     low, high = (number(end, "between", "stiffness", "positive") for end in between)

@@ -18,6 +18,7 @@ differ in what a hold does.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax
@@ -116,6 +117,61 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
         low, high = (float(k[i]) for i in (unstable[-1], min(unstable[-1] + 1, _POINTS - 1)))
         k = np.geomspace(low, high, _POINTS)
     return low
+
+
+class SlidingThreshold(NamedTuple):
+    """Where unmodulated sliding on rigid asperities loses stability, without inertia.
+
+    Attributes
+    ----------
+    stiffness : array
+        K/W0 (1/m); not positive where sliding is stable at any stiffness.
+    wavenumber : array
+        Of the oscillation there, its pulsation over V (1/m); 0 where the stiffness is not positive.
+    """
+
+    stiffness: Float
+    wavenumber: Float
+
+
+def sliding_threshold(p: Mapping[str, Any]) -> SlidingThreshold:
+    """The threshold of a law with A, B and D0, and with B2 and D2 if it has a second state.
+
+    Parameters
+    ----------
+    p : mapping of str to array
+        Parameters of the law by name; NaN for the B2 and D2 of a point without a second state.
+
+    Notes
+    -----
+    A disturbance that grows as exp(s u) over the slip u changes the logarithm of the velocity by x
+    and friction by (A - B/(1 + s D0) - B2/(1 + s D2)) x, which the spring follows by -k x/s:
+
+        A s + k - s [B/(1 + s D0) + B2/(1 + s D2)] = 0.
+
+    With one state this gives k = (B - A)/D0 and s^2 = -(B - A)/(A D0^2), Eqs. (18) and (19) of
+    Bureau et al. (2000). With two states it is a cubic a3 s^3 + a2 s^2 + a1 s + k, which has an
+    imaginary pair where a1 a2 = a3 k (Hurwitz): a quadratic for k, whose larger root counts.
+    """
+    A, B, D0 = (np.asarray(p[name], float) for name in ("A", "B", "D0"))
+    B2, D2 = (np.asarray(p.get(name, np.nan), float) for name in ("B2", "D2"))
+    two = np.isfinite(B2) & np.isfinite(D2)
+    B2, D2 = np.where(two, B2, 0.0), np.where(two, D2, D0)
+    product, total = D0 * D2, D0 + D2
+    a1, a2 = (
+        A - B - B2,
+        A * total - B * D2 - B2 * D0,
+    )  # at k = 0; they rise by these lengths times k
+    linear = a2 * total + (a1 - A) * product
+    with np.errstate(all="ignore"):
+        root = np.sqrt(linear**2 - 4 * product * total * a1 * a2)
+        # Without cancellation; no real root, or none above zero, is stable sliding.
+        larger = np.where(
+            linear < 0, (root - linear) / (2 * product * total), -2 * a1 * a2 / (linear + root)
+        )
+    k = np.where(two, np.nan_to_num(larger), -a1 / D0)
+    square = np.maximum((a1 + k * total) / (A * product), 0.0)
+    return SlidingThreshold(k, np.where(k > 0, np.sqrt(square), 0.0))
 
 
 def _growth(law: Law, V: float, k: Float) -> Float:

@@ -10,6 +10,8 @@ import asperity as asp
 from asperity import materials
 from asperity.errors import InputError
 from asperity.study import SweepPlan, job, open_store, run_sweep, store_status
+from asperity.study.grid import SweepGrid
+from asperity.theory.memory import critical_stiffness
 from references.closed_form_sweep import ThisProcess
 
 PMMA = materials.load("bureau2000")
@@ -89,6 +91,34 @@ def test_thresholds_without_modulation_are_the_closed_form(tmp_path: Path) -> No
     K = expected * (B - PMMA.A) * PMMA.W0 / PMMA.D0
     assert dataset["K_threshold"].values == pytest.approx(K, rel=1e-5)
     assert (dataset["bifurcation"] == 2).all()
+
+
+def test_a_threshold_without_a_scale_says_so(tmp_path: Path) -> None:
+    """The outcome was that a parameter breaks its rule."""
+    sweep(
+        tmp_path / "s.zarr",
+        solve="threshold",
+        law="rice-ruina",
+        parameters={"V": 1e-6, "frequency": 120.0, "epsilon": 0.0},
+        axes={"B": {"values": (0.01, 0.026)}},
+        threshold={"between": (0.5, 2.0), "scan": 5},
+    )
+    assert store_status(tmp_path / "s.zarr").outcomes == {"converged": 1, "no_scale": 1}
+
+
+def test_the_stiffness_ratio_counts_the_states_of_each_law(tmp_path: Path) -> None:
+    second = {"B2": 0.012, "D2": "3 um"}
+    grid = SweepGrid.of(
+        SweepPlan(
+            material="bureau2000",
+            parameters={"V": 1e-6, "frequency": 120.0, "epsilon": 0.1, **second},
+            axes={"law": {"values": ("rice-ruina", "two-state")}, "K/Kc": {"values": (0.9,)}},
+        )
+    )
+    K = np.concatenate([grid.at(chunk).values["K"] for chunk in range(grid.chunk_count)])
+    two = PMMA.law("two-state", B2=0.012, D2=3e-6)
+    exact = critical_stiffness(two, 1e-6) * PMMA.W0
+    np.testing.assert_allclose(K, [0.9 * KC, 0.9 * exact], rtol=1e-9)
 
 
 def test_transients_become_named_numbers(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from asperity.errors import require
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Output, canonical_name
 from asperity.questions.sweep import Sweep
-from asperity.study.points import RATIOS, Answers, Points
+from asperity.study.points import RATIOS, Answers, Points, SweepOutcome, critical_stiffness
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
@@ -23,13 +23,14 @@ _SOUGHT = {"K": MACHINE["K"], "stiffness_ratio": RATIOS["stiffness_ratio"].param
 class ThresholdSolve(SolveKind):
     """`asperity.study.threshold.stiffness_threshold` at every point; it gives K and K/K_c.
 
-    The limits of the search are multiples of K_c = (B - A) W0/D0 of the same point.
+    The limits of the search are multiples of K_c of the same point, from
+    `asperity.study.threshold.natural_scales`.
     """
 
     name = "threshold"
     outputs = (
         Output("K_threshold", "N/m", "stiffness below which modulated sliding is unstable", "K^*"),
-        Output("threshold_ratio", "1", "threshold over K_c = (B - A) W0/D0", "K^*/K_c"),
+        Output("threshold_ratio", "1", "threshold over K_c of unmodulated sliding", "K^*/K_c"),
         Output("mode_frequency", "Hz", "frequency of the mode that starts to grow, modulo f"),
         Output("bifurcation", "1", "0: fold, 1: period doubling, 2: Neimark-Sacker"),
     )
@@ -60,10 +61,13 @@ class ThresholdSolve(SolveKind):
         values = points.of_law(law.name)
         critical = np.full(len(points), np.nan)
         if {"A", "B", "D0"} <= set(values):
-            critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
-        # A point has no stiffness; the softest one of the search is checked in its place.
-        values["K"] = record["settings"]["between"][0] * critical
+            critical = critical_stiffness(values)
+        # A point has no stiffness; any valid one is checked in its place.
+        values["K"] = np.ones(len(points))
         sound = solvable(law, values, answers)
+        scaled = critical[sound] > 0
+        answers.fail(sound[~scaled], SweepOutcome.NO_SCALE)
+        sound = sound[scaled]
         if not len(sound):
             return answers
         values, critical = {n: v[sound] for n, v in values.items()}, critical[sound]
