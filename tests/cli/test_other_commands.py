@@ -33,6 +33,13 @@ def test_air_text_and_vacuum(asperity) -> None:
     assert "1.16874" in shown.stdout
     assert "gamma" not in shown.stdout
     assert "gamma" in asperity("air", *MATERIAL, "-f", "200 Hz").stdout
+    filled, empty = (
+        json.loads(asperity("air", *MATERIAL, "-f", "200 Hz", "--json", *more).stdout)
+        for more in ((), ("--vacuum",))
+    )
+    assert filled.keys() == empty.keys()
+    assert filled["points"][0].keys() == empty["points"][0].keys()
+    assert empty["points"][0]["layer_stiffness"] is empty["gas_flow"] is None
 
 
 def test_air_set_replaces_the_material(asperity) -> None:

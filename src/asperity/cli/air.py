@@ -143,7 +143,9 @@ def _forward(
         "ratio": effective_modulation(hertz, layer=layer, **contact),
         "phase": modulation_phase(hertz, layer=layer, **contact),
     }
-    stiffness: dict[str, Any] = {}
+    # Without a layer its numbers are null: JSON has the same keys.
+    absent: dict[str, Any] = {"squeeze": None, "layer_stiffness": None}
+    stiffness: dict[str, Any] = {"air_stiffness": None, "gas_flow": None}
     if layer is not None:
         omega = 2 * np.pi * np.array(hertz)
         dynamic = layer.dynamic_stiffness(omega)
@@ -152,7 +154,7 @@ def _forward(
         head += ["|gamma R|", "spring (N/m)", "damping (N/m)"]
         stiffness = {"air_stiffness": layer.stiffness, "gas_flow": layer.gas_flow}
     points = [
-        {"frequency": f, **{name: np.asarray(c)[i].tolist() for name, c in columns.items()}}
+        {"frequency": f, **absent, **{n: np.asarray(c)[i].tolist() for n, c in columns.items()}}
         for i, f in enumerate(hertz)
     ]
     table = np.column_stack(list(columns.values()))
