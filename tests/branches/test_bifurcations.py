@@ -1,10 +1,13 @@
 """Bifurcations of the package against shooting on the equations as printed."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
 import asperity as asp
+from asperity.branches import bifurcations
 from asperity.branches.parameters import one_problem
 from asperity.errors import InputError
 from asperity.loads import Harmonic
@@ -196,6 +199,24 @@ def test_any_parameter_can_be_continued(rapid, parameter, start, end):
     _, monodromy = last.followed(0.05, 3)
     expected = np.linalg.eigvals(monodromy)
     assert np.abs(branch.multipliers[-1]).max() == pytest.approx(np.abs(expected).max(), rel=1e-8)
+
+
+def test_an_orbit_without_multipliers_is_not_stable(stabilised, rapid, monkeypatch):
+    unknown = np.full_like(stabilised.log_multipliers, np.nan)
+    assert not dataclasses.replace(stabilised, log_multipliers=unknown).stable.any()
+    # Nor is it a point of a branch: bifurcations next to it would be missed.
+    known, calls = bifurcations.log_multipliers, []
+
+    def lost_after_three(*arrays):
+        calls.append(arrays)
+        return known(*arrays) * (1.0 if len(calls) <= 3 else np.nan)
+
+    monkeypatch.setattr(bifurcations, "log_multipliers", lost_after_three)
+    branch = asp.continuation(
+        rapid.slider, parameter="epsilon", span=(0, 0.2), velocity="1 um/s", frequency="120 Hz"
+    )
+    assert len(branch.parameter) == 3
+    assert "could not be followed" in branch.result
 
 
 def test_a_dataset_has_units_and_provenance(hysteresis, tmp_path):

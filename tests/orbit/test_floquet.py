@@ -34,6 +34,13 @@ def logs(matrix, log_determinant, log_scale=0.0):
     return log_multipliers(stacked, np.array([log_scale]), np.array([log_determinant]))[:, 0]
 
 
+@pytest.mark.parametrize("size", [2, 3])
+def test_a_monodromy_matrix_that_is_lost_has_no_multipliers(size):
+    """Of three states it had multipliers of 0, those of a stable orbit."""
+    lost = np.full((size, size, 1), np.nan)
+    assert np.isnan(log_multipliers(lost, np.zeros(1), np.zeros(1)).real).all()
+
+
 def similar(triangle):
     """A full matrix with the eigenvalues of `triangle`."""
     basis = np.array([[1.0, 0.4], [-0.7, 1.2]])

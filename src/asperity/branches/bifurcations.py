@@ -97,7 +97,10 @@ class BranchFollower(NamedTuple):
     def step(
         self, point: ContinuationPoint, length: float
     ) -> tuple[BranchOrbit | None, BranchStep]:
-        """The orbit at the distance `length` from `point`, None where Newton's method fails."""
+        """The orbit at the distance `length` from `point`.
+
+        None where Newton's method fails, or the multipliers are not known.
+        """
         spare_mappings()
         step = branch_step(
             self.line,
@@ -112,6 +115,8 @@ class BranchFollower(NamedTuple):
         problem = self.line.at(following.t)
         read = read_orbit(problem, step.orbit, self.harmonics)
         logs = log_multipliers(read.monodromy, read.log_scale, read.log_determinant)
+        if np.isnan(logs).any():
+            return None, step
         orbit = BranchOrbit(
             float(read.mean_friction[0]),
             read.harmonics[:, 0],

@@ -184,7 +184,7 @@ class Branch(Displayed):
     @property
     def stable(self) -> Bool:
         """Whether a small perturbation dies out."""
-        return np.asarray(self.unstable == 0)
+        return np.asarray((self.log_multipliers.real < 0).all(1))
 
     @property
     def thresholds(self) -> Float:

@@ -54,7 +54,7 @@ _RESULTS = {
     ),
     "stuck": (
         "the branch could not be followed beyond {value:.6g}{unit}, where "
-        "no step along it is short enough for Newton's method"
+        "no step along it is short enough for Newton's method to find an orbit with its multipliers"
     ),
 }
 

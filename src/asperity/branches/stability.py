@@ -509,7 +509,7 @@ def _boundary_curve(plane: ParameterPlane, curve: TracedBoundary) -> BoundaryCur
     x, y = (p.value(at[:, i]) for i, p in enumerate(plane.parameters))
     logs = np.stack([p.branch_orbit.logs for p in curve.points])
     # The multipliers nearest to the unit circle are the critical ones.
-    growth = np.nan_to_num(logs.real)
+    growth = logs.real
     order = np.argsort(np.abs(growth), axis=1, kind="stable")
     mode = [
         0.0 if curve.kind == "fold" else p.branch_orbit.mode_frequency(k)

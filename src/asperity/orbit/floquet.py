@@ -59,6 +59,7 @@ def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) 
     Returns
     -------
     array, shape (n, points), sorted by falling real part
+        NaN where a matrix is not finite.
     """
     n = monodromy.shape[0]
     with np.errstate(all="ignore"):
@@ -66,10 +67,11 @@ def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) 
             return log_determinant[None].astype(complex)
         if n == 2:
             return _log_pair(monodromy, log_scale, log_determinant)
-        finite = np.where(np.isfinite(monodromy), monodromy, 0.0)
-        values = np.log(np.linalg.eigvals(np.moveaxis(finite, -1, 0)).T.astype(complex))
+        known = np.isfinite(monodromy).all((0, 1))
+        matrices = np.moveaxis(np.where(known, monodromy, 0.0), -1, 0)
+        values = np.log(np.linalg.eigvals(matrices).T.astype(complex))
     logs: Complex = sorted_logs(values + log_scale)
-    return logs
+    return np.where(known, logs, np.nan)
 
 
 def log_multipliers_of_exponent(exponent: Any, log_determinant: Any) -> Any:
