@@ -23,6 +23,7 @@ from scipy.ndimage import distance_transform_edt
 from asperity.arrays import Float
 from asperity.figures.style import new_figure
 from asperity.parameters.arguments import typed
+from asperity.study.map.dataset import critical_line
 from asperity.study.points import known_quantities
 from asperity.units import display_unit
 
@@ -103,7 +104,7 @@ def draw_plane(axis: Axes, dataset: xarray.Dataset, show: str) -> QuadMesh:
     )
     _draw_failed(axis, dataset, grid)
     _draw_boundary(axis, dataset, units)
-    if (line := unmodulated(dataset)) is not None:
+    if (line := critical_line(dataset)) is not None:
         halo = patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)
         pair = (values / unit[0] for values, unit in zip(line, units, strict=True))
         axis.plot(*pair, zorder=3, path_effects=[halo], **_UNMODULATED)
@@ -149,7 +150,7 @@ def keys(dataset: xarray.Dataset) -> list[Any]:
         for kind, line in KIND_LINES.items()
         if kind in kinds
     ]
-    if "critical_stiffness" in dataset:
+    if critical_line(dataset) is not None:
         entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
     if not dataset["converged"].values.all():
         entries.append(Patch(label="no response", **_FAILED))
@@ -236,16 +237,6 @@ def _runs(kinds: NDArray[np.str_]) -> list[tuple[int, int, str]]:
     starts = [0, *changes.tolist()]
     ends = [min(k + 1, len(kinds)) for k in [*changes.tolist(), len(kinds)]]
     return [(a, b, str(kinds[a])) for a, b in zip(starts, ends, strict=True)]
-
-
-def unmodulated(dataset: xarray.Dataset) -> tuple[Float, Float] | None:
-    """The line K = K_c of an unmodulated load, x and y in SI; None where it is not known."""
-    if "critical_stiffness" not in dataset:
-        return None
-    Kc = dataset["critical_stiffness"]
-    other = str(Kc.dims[0])
-    pair = dataset[other].values, Kc.values
-    return pair if dataset.attrs["x"] == other else pair[::-1]
 
 
 def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:

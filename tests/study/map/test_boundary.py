@@ -12,6 +12,7 @@ from asperity.operating_point import known_parameters
 from asperity.parameters import OUTPUTS
 from asperity.study.map import SHOWN
 from asperity.study.map.boundary import trace_boundary
+from asperity.study.map.dataset import critical_line
 
 
 def traced(plane):
@@ -116,7 +117,7 @@ def test_nothing_to_trace(known) -> None:
     assert boundary.where.shape == (0, 2)
 
 
-def planted(**changes) -> xarray.Dataset:
+def planted(law="rice-ruina", **changes) -> xarray.Dataset:
     """A map of 3 x 4 points with a boundary of two kinds, in the form that `response_map` gives."""
     eps, K = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1e5, 2e5, 3e5])
     values = (K[:, None] / 1e5 - 2.2) * (1 + eps)
@@ -129,15 +130,17 @@ def planted(**changes) -> xarray.Dataset:
         "boundary_kind": ("boundary_point", kinds, units),
         "boundary_epsilon": ("boundary_point", eps, units),
         "boundary_K": ("boundary_point", np.full(4, 2.2e5), units),
-        "critical_stiffness": ("epsilon", np.full(4, 2.5e5), units),
     }
     data |= changes
-    attrs = {"x": "epsilon", "y": "K", "x_scale": "linear", "y_scale": "log"}
+    attrs = {"law": law, "x": "epsilon", "y": "K", "x_scale": "linear", "y_scale": "log"}
     coords = {
         "epsilon": ("epsilon", eps, units),
         "K": ("K", K, {"units": "N/m", "long_name": "stiffness of the pulling spring"}),
     }
-    return xarray.Dataset({k: v for k, v in data.items() if v is not None}, coords, attrs)
+    # K_c = (B - A) W0/D0 = 2.5e5 N/m.
+    point = {"mu0": 0.5, "A": 0.01, "B": 0.02, "D0": 4e-7, "W0": 10.0, "V": 1e-6, "M": 0.0}
+    point |= {"frequency": 120.0, "inertia": 0.0, "eta": 0.0}
+    return xarray.Dataset(data, coords | point, attrs)
 
 
 def lines_of(figure) -> list[tuple[str, list[float]]]:
@@ -162,9 +165,20 @@ def test_the_boundary_is_drawn_by_kind_without_a_gap() -> None:
 
 def test_the_unmodulated_limit_is_drawn_only_where_it_is_known() -> None:
     with style():
-        with_it, without = draw_map(planted()), draw_map(planted(critical_stiffness=None))
+        with_it, without = draw_map(planted()), draw_map(planted("nagata"))
     assert any(np.allclose(y, 250.0) for _, y in lines_of(with_it))
     assert not any(np.allclose(y, 250.0) for _, y in lines_of(without))
+
+
+def test_the_unmodulated_limit_is_not_drawn_by_chords_between_the_points_of_the_grid() -> None:
+    """K_c = (B - A) W0/D0 over D0, of which the grid has three values."""
+    ends, units = np.array([1e-7, 5e-7, 1e-6]), {"units": "m", "long_name": "memory length"}
+    dataset = planted().drop_vars("D0").isel(epsilon=slice(3)).rename(epsilon="D0")
+    dataset = dataset.assign_coords(D0=("D0", ends, units)).assign_attrs(x="D0")
+    length, Kc = critical_line(dataset)
+    np.testing.assert_allclose(Kc, 0.1 / length, rtol=1e-12)
+    middle = (length[1:] + length[:-1]) / 2
+    np.testing.assert_allclose((Kc[1:] + Kc[:-1]) / 2, 0.1 / middle, rtol=1e-4)
 
 
 def test_points_without_response_are_hatched_and_named() -> None:

@@ -16,7 +16,7 @@ from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
 from asperity.questions.record import WHOLE
 from asperity.study.map import SHOWN, Axis, response_map
-from asperity.study.map.dataset import boundary_lines
+from asperity.study.map.dataset import boundary_lines, critical_line
 
 #: Points along each axis of the first grid, which has no boundary; each following grid has twice as
 #: many, up to the number in the question.
@@ -126,7 +126,7 @@ def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
 
 
 def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, Any]:
-    from asperity.figures.map import region_names, unmodulated
+    from asperity.figures.map import region_names
 
     values = result[question.show].values
     lines = [
@@ -143,7 +143,7 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
         "values": [[_short(v) for v in row] for row in values.tolist()],
         "stable": result["stable"].values.astype(int),
         "regions": region_names(result),
-        "unmodulated": unmodulated(result),
+        "unmodulated": critical_line(result),
         "failed": int(failed.sum()),
         "reasons": list(reasons)[:5],
         "boundaries": lines,

@@ -9,6 +9,7 @@ import numpy as np
 import xarray
 
 from asperity._version import __version__
+from asperity.arrays import Float, between
 from asperity.parameters import OUTPUTS, point_parameters
 from asperity.study.map.boundary import MapBoundary
 from asperity.study.map.plane import SHOWN, MapPlane
@@ -17,6 +18,8 @@ from asperity.study.responses import bifurcation_kinds, is_stable
 from asperity.theory import closed_forms as cf
 
 _POINT = "boundary_point"
+#: Points of the line K = K_c: chords of K_c ~ 1/D0 leave it by less than a pixel over two decades.
+_LINE = 1001
 _CONVENTION = "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)"
 
 
@@ -46,11 +49,13 @@ def as_dataset(
     ):
         data[name] = (dims, values.reshape(plane.shape), OUTPUTS[name].attributes)
     data |= _boundary(plane, boundary)
-    for side, values in _critical_stiffness_along(plane).items():
-        data["critical_stiffness"] = (side, values, _described("N/m", "K_c of unmodulated sliding"))
-    return xarray.Dataset(
+    dataset = xarray.Dataset(
         data, coords=_coordinates(plane, origins), attrs=_global_attributes(plane, boundary)
     )
+    if (along := _critical_stiffness(dataset)) is not None:
+        side, _, Kc = along
+        dataset["critical_stiffness"] = (side, Kc, _described("N/m", "K_c of unmodulated sliding"))
+    return dataset
 
 
 def boundary_lines(dataset: xarray.Dataset) -> list[dict[str, Any]]:
@@ -84,31 +89,47 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
     }
 
 
-def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
-    """K_c (N/m) of unmodulated sliding along the other axis of a map with K on an axis.
+def critical_line(dataset: xarray.Dataset) -> tuple[Float, Float] | None:
+    """The line K = K_c of an unmodulated load, x and y in SI, however few points the grid has.
 
-    Returns
-    -------
-    dict of str to array
-        By the name of the other axis; empty if K is on neither, or there is no closed form for
-        the law with this inertia and damping.
+    None where K is on neither axis, or there is no closed form.
     """
-    axes = {plane.x.name: plane.x, plane.y.name: plane.y}
-    if "K" not in axes:
-        return {}
-    (other,) = (axis for name, axis in axes.items() if name != "K")
-    u = np.linspace(0.0, 1.0, other.count)
-    where = np.stack([u, 0 * u] if other is plane.x else [0 * u, u], axis=-1)
-    values = plane.values(where)
-    elastic: Any = values.get("lambda", np.zeros(1))
+    along = _critical_stiffness(dataset, _LINE)
+    if along is None:
+        return None
+    _, at, Kc = along
+    # Elsewhere unmodulated sliding is stable, or unstable, at any stiffness.
+    known = np.isfinite(Kc) & (Kc > 0)
+    pair = at[known], Kc[known]
+    return pair[::-1] if dataset.attrs["x"] == "K" else pair
+
+
+def _critical_stiffness(
+    dataset: xarray.Dataset, count: int | None = None
+) -> tuple[str, Float, Float] | None:
+    """The axis of a map that is not K, `count` points along it, and K_c (N/m) there.
+
+    By default at the points of the grid. None if K is on neither axis, or there is no closed form
+    for the law with this inertia and damping.
+    """
+    sides = {dataset.attrs[side]: side for side in "xy"}
+    if "K" not in sides:
+        return None
+    (other,) = (name for name in sides if name != "K")
+    (low, high), log = dataset[other].values[[0, -1]], dataset.attrs[f"{sides[other]}_scale"]
+    at = between(low, high, np.linspace(0, 1, count or dataset[other].size), log=log == "log")
+    fixed = {str(n): float(c) for n, c in dataset.coords.items() if not c.ndim}
+    values: dict[str, Any] = {**fixed, "K": 1.0, other: at}
+    elastic = values.get("lambda", 0.0)
     form = cf.critical_stiffness_form(
-        plane.law.name, elastic=bool(np.any(elastic)), inertia=bool(np.any(values["inertia"]))
+        dataset.attrs["law"], elastic=bool(np.any(elastic)), inertia=bool(np.any(values["inertia"]))
     )
     if form is None or np.any(values["eta"] > 0):
-        return {}
-    numbers: dict[str, Any] = {n: values[n] for n in ("A", "B", "D0", "K", "W0", "V", "M")}
+        return None
+    numbers = {n: values[n] for n in ("A", "B", "D0", "K", "W0", "V", "M")}
     numbers |= {"mu": values["mu0"], "omega": 2 * np.pi * values["frequency"]}
-    return {other.name: np.asarray(form(cf.SmallModulation(**numbers, lambda_=elastic)))}
+    Kc = np.asarray(form(cf.SmallModulation(**numbers, lambda_=elastic)))
+    return other, at, np.broadcast_to(Kc, at.shape)
 
 
 def _coordinates(plane: MapPlane, origins: Mapping[str, str]) -> dict[str, Any]:
