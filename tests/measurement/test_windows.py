@@ -91,6 +91,7 @@ def test_verdicts_follow_the_limits() -> None:
         "small_is_bad": ["bad", "suspicious", "ok"],
     }.items():
         assert [limits.check(name, n, "").verdict for n in (0.5, 1.5, 2.5)] == verdicts
+        assert limits.check(name, np.nan, "").verdict == "bad"
     assert limits.check("large_is_bad", 9, "", significant=False).verdict == "ok"
     assert worst([limits.check("large_is_bad", n, "") for n in (0, 1.5)]) == "suspicious"
     assert worst([]) == "ok"

@@ -436,7 +436,7 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     checks: list[Check] = []
 
     def ask(name: str, number: float, sentence: str, doubt: str = "", error: float = 0.0) -> None:
-        check = STICK_SLIP.check(name, number, sentence, significant=abs(number) >= 3 * error)
+        check = STICK_SLIP.check(name, number, sentence, significant=not abs(number) < 3 * error)
         checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
 
     text = f"{count} complete event{'' if count == 1 else 's'}"

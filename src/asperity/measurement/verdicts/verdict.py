@@ -64,7 +64,8 @@ class Limits(dict[str, tuple[float, float]]):
         small_is_bad = suspicious > bad
 
         def beyond(limit: float) -> bool:
-            return number < limit if small_is_bad else number > limit
+            # A number that is not known is beyond every limit.
+            return not (number >= limit if small_is_bad else number <= limit)
 
         verdict: Verdict = "ok"
         if significant and beyond(suspicious):
