@@ -204,7 +204,9 @@ def test_a_transient_follows_a_recording_next_to_its_plan(tmp_path: Path) -> Non
     ("fields", "place"),
     [
         ({"parameters": {"V": 1e-6, "epsilon": 0.2}}, "parameters.epsilon"),
+        ({"parameters": {"V": 1e-6, "frequency": 120.0}}, "parameters.frequency"),
         ({"axes": {"pull": {"values": (0.1, 0.2)}}}, "axes.pull"),
+        ({"axes": {"slip_ratio": {"values": (0.1, 0.2)}}}, "axes.slip_ratio"),
     ],
 )
 def test_a_modulation_that_no_step_uses_is_refused(

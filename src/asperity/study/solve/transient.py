@@ -25,7 +25,7 @@ from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
 from asperity.questions.sweep import NumberTable, Sweep, TransientTable
 from asperity.slider.parameters import slider_from
-from asperity.study.points import Answers, Points, SweepOutcome
+from asperity.study.points import RATIOS, Answers, Points, SweepOutcome
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.transients import Trajectory, transient
@@ -172,8 +172,11 @@ def _require_drive_in_steps(plan: Sweep, table: TransientTable) -> None:
     used = {name for line in table.steps for _, name, *_ in string.Formatter().parse(line)}
     given = {n: f"parameters.{n}" for n, value in plan.parameters.items() if value}
     given |= {name: f"axes.{name}" for name in plan.single_columns}
+    drive = {n: DRIVE[n] for n in ("epsilon", "frequency")}
+    ratios = {n: ratio.parameter for n, ratio in RATIOS.items() if ratio.target in drive}
     for written, place in given.items():
-        name = canonical_name(written, {"epsilon": DRIVE["epsilon"], **MODULATION})
+        name = canonical_name(written, {**drive, **ratios, **MODULATION})
+        name = RATIOS[name].target if name in RATIOS else name
         rule, advice = "stand in a step", "write it into one, in braces, or leave it out"
         require(name is None or name in used, place, rule, f"no '{{{name}}}'", advice)
 
