@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.arrays import Float
@@ -26,6 +25,7 @@ from asperity.inference.design.candidates import (
     some_of,
     with_readings,
 )
+from asperity.inference.design.criteria import Determinant
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
 from asperity.inference.design.rival import (
     RivalFit,
@@ -33,12 +33,11 @@ from asperity.inference.design.rival import (
     reached,
     separation,
 )
-from asperity.inference.design.shares import (
-    Determinant,
+from asperity.inference.design.weights import (
     EvenGrid,
-    Shares,
+    Whole,
     even_grid,
-    optimal_shares,
+    optimal_weights,
     times_fewer,
     whole_readings,
 )
@@ -130,7 +129,7 @@ class Design(Warned):
     readings, spent : float
         Number of readings, and their cost, in readings or s.
     efficiency : float
-        Lower bound of the information of the optimal shares over that of the best possible design,
+        Lower bound of the information of the optimal weights over that of the best possible design,
         by the general equivalence theorem.
     efficiency_whole : float
         The same for whole readings.
@@ -284,7 +283,7 @@ class Design(Warned):
         return rows
 
 
-#: If the efficiency is lower, a warning says that the shares may not be optimal.
+#: If the efficiency is lower, a warning says that the weights may not be optimal.
 _TRUSTED = 0.95
 #: With fewer candidates per free parameter, the ranges decide the design.
 _FEW = 3
@@ -362,11 +361,6 @@ def _require_candidates(candidates: Candidates) -> None:
         raise InputError("ranges", rule, f"none of {candidates.total} ({why})", advice)
 
 
-def fisher_information(jacobian: Float) -> Float:
-    """Information of one reading at each candidate, shape (candidates, p, p)."""
-    return np.asarray(np.einsum("imp,imq->ipq", jacobian, jacobian))
-
-
 @dataclass(frozen=True, eq=False)
 class _Task:
     """A plan with its candidates solved."""
@@ -381,23 +375,22 @@ class _Task:
 
     @property
     def prior(self) -> Float:
-        """Information of the priors of the later fit."""
+        """Derivatives of the residuals of the priors of the later fit, shape (q, p)."""
         truth = self.plan.truth
-        slopes = truth.prior_residuals(truth.coordinates(expected_values(truth)))[1]
-        return np.asarray(slopes.T @ slopes)
+        return truth.prior_residuals(truth.coordinates(expected_values(truth)))[1]
 
     def measuring(self, simulate: int) -> Design:
         """The design that measures parameters."""
         total, criterion = self.plan.budget, self._determinant()
-        self.report(0, 1, "shares")
-        shares = optimal_shares(criterion, total / self.cost)
-        n = whole_readings(criterion, self.cost, total, shares.shares)
+        self.report(0, 1, "design weights")
+        weights, efficiency = optimal_weights(criterion, total / self.cost)
+        n = whole_readings(criterion, self.cost, total, weights)
         value = criterion.value(n.astype(float))
-        best = criterion.value(shares.shares * total / self.cost)
-        reached = shares.efficiency * criterion.least_efficiency(best - value, value)
+        behind = criterion.value(weights * total / self.cost) - value
+        whole = efficiency * math.exp(-max(behind, 0.0) / criterion.parameters)
         fewer = times_fewer(criterion, self.grid.readings(self.cost, total), value)
         alone = self._alone(criterion, value)
-        return self._described(n, shares, reached, simulate, fewer=fewer, alone=alone)
+        return self._described(n, efficiency, whole, simulate, fewer=fewer, alone=alone)
 
     def _alone(
         self, criterion: Determinant, value: float
@@ -414,7 +407,7 @@ class _Task:
                 if rows.size:
                     part = criterion.restricted(rows)
                     readings = self.plan.budget / self.cost[rows]
-                    n = optimal_shares(part, readings).shares * readings
+                    n = optimal_weights(part, readings)[0] * readings
                     more = times_fewer(part, n, value)
                 levels.append((float(level), int(rows.size), more))
             result[axis] = tuple(levels)
@@ -460,14 +453,12 @@ class _Task:
                 f"{name} has no response at {result.unseen} candidates with the values that come "
                 "nearest; they were not judged"
             )
-        whole = result.criterion.least_efficiency(result.chi2_shares - best.chi2, best.chi2)
-        shares = result.shares
-        if probable is None:  # the bound holds only at a minimum
-            shares = replace(shares, efficiency=0.0)
+        # The bound holds only at a minimum.
+        efficiency = 0.0 if probable is None else result.efficiency
         return self._described(
             result.readings,
-            shares,
-            shares.efficiency * whole,
+            efficiency,
+            efficiency * min(best.chi2 / result.chi2_weights, 1.0),
             simulate,
             (fits, best.u),
             warnings,
@@ -494,17 +485,15 @@ class _Task:
             readings = expected_readings(plan, some, at.whole)
             jacobian = differences(plan.truth, readings, at, values)[1]
             # A point without steady sliding has no information.
-            information = np.zeros((len(points["V"]), *self.prior.shape))
-            information[rows] = fisher_information(jacobian)
-            parts.append(information)
-        parts = parts or [fisher_information(self.jacobian)]
-        return Determinant(np.array(parts), np.array([self.prior] * len(parts)), interest)
+            parts.append(np.zeros_like(self.jacobian))
+            parts[-1][rows] = jacobian
+        return Determinant(np.array(parts or [self.jacobian]), self.prior, interest)
 
     def _described(
         self,
-        n: NDArray[np.int64],
-        shares: Shares,
-        reached: float,
+        n: Whole,
+        efficiency: float,
+        whole: float,
         simulate: int,
         rival: tuple[RivalFit, Float] | None = None,
         warnings: Sequence[str] = (),
@@ -515,7 +504,7 @@ class _Task:
         """The design of whole readings; `numbers` are further fields of it."""
         candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
-        warnings = [*warnings, *self._warnings(errors, shares)]
+        warnings = [*warnings, *self._warnings(errors, efficiency)]
         undetermined = any(math.isinf(errors[name].se) for name in self.plan.question.measure)
         simulation = None
         if simulate:
@@ -526,8 +515,8 @@ class _Task:
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
             readings=int(n.sum()),
             spent=float(n @ self.cost),
-            efficiency=shares.efficiency,
-            efficiency_whole=reached,
+            efficiency=efficiency,
+            efficiency_whole=whole,
             parameters=errors,
             correlation=correlation,
             fewer=math.nan if undetermined else fewer,
@@ -543,11 +532,11 @@ class _Task:
 
     def _errors(self, n: Float) -> tuple[dict[str, ExpectedError], Float]:
         """Expected standard errors with the design and with the even grid, and correlations."""
-        information = fisher_information(self.jacobian)
+        information = np.einsum("imp,imq->ipq", self.jacobian, self.jacobian)
+        prior = self.prior.T @ self.prior
         grid = self.grid.readings(self.cost, self.plan.budget)
         (covariance, loose), (even, loose_even) = (
-            inverse_information(np.einsum("i,ipq->pq", m, information) + self.prior)
-            for m in (n, grid)
+            inverse_information(np.einsum("i,ipq->pq", m, information) + prior) for m in (n, grid)
         )
         sd, sd_even = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(even))
         errors = {}
@@ -562,7 +551,7 @@ class _Task:
             )
         return errors, covariance / np.outer(sd, sd)
 
-    def _warnings(self, errors: Mapping[str, ExpectedError], shares: Shares) -> list[str]:
+    def _warnings(self, errors: Mapping[str, ExpectedError], efficiency: float) -> list[str]:
         warnings, usable = [], self.candidates.index.size
         for unknown in self.plan.truth.unknowns:
             error = errors[unknown.name]
@@ -574,10 +563,10 @@ class _Task:
                     f"{named(unknown.name)} will not be determined by these readings: its "
                     f"standard error will be {error.se:.3g} {error.unit}".rstrip()
                 )
-        if shares.efficiency < _TRUSTED:
+        if efficiency < _TRUSTED:
             warnings.append(
-                f"the search for the best shares ended early: they are at least "
-                f"{shares.efficiency:.2g} times as good as the best possible"
+                f"the search for the best design weights ended early: they are at least "
+                f"{efficiency:.2g} times as good as the best possible"
             )
         if usable < _FEW * len(errors):
             warnings.append(
@@ -586,7 +575,7 @@ class _Task:
             )
         return warnings
 
-    def _point(self, i: int, n: NDArray[np.int64]) -> DesignedPoint:
+    def _point(self, i: int, n: Whole) -> DesignedPoint:
         readings = self.expected
         return DesignedPoint(
             {name: float(v[i]) for name, v in self.candidates.points.items()},

@@ -1,7 +1,7 @@
 """Points that exclude a law: chi-squared of the rival, refitted, is as large as it can be.
 
-The rival's predictions are linearised at its last fit; the optimal shares are then a concave
-problem. The rival is refitted at these shares, and a step towards them is accepted if the
+The rival's predictions are linearised at its last fit; the optimal weights are then a concave
+problem. The rival is refitted at these weights, and a step towards them is accepted if the
 chi-squared of the refitted rival grows. The general equivalence theorem at the last fit bounds the
 gain of any better design (Atkinson and Fedorov, 1975). The probability that the readings exclude
 the rival follows from the linear predictions of both laws.
@@ -14,20 +14,20 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Float
 from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import differences, predicted, with_readings
+from asperity.inference.design.criteria import Misfit
 from asperity.inference.design.plan import DesignPlan, expected_values
-from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
+from asperity.inference.design.weights import Whole, optimal_weights, whole_readings
 from asperity.inference.objective import Minimum, Objective, aicc_penalty
 from asperity.inference.tables.table import LockInTable
 
 _ROUNDS = 15
 #: The search ends at this efficiency.
 _ENOUGH = 0.99
-#: Fractions of the step to the proposed shares that are tried.
+#: Fractions of the step to the proposed weights that are tried.
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 _NEGLIGIBLE = 1e-4
 #: Rounds of exchanges of whole readings, with a refit of the rival after each round.
@@ -39,26 +39,27 @@ _LEFT = 0.01
 
 
 class Separation(NamedTuple):
-    """Shares of the budget, the whole readings, and the best fit of the rival to them.
+    """The whole readings of a design, and the best fit of the rival to them.
 
     Attributes
     ----------
-    shares : Shares
+    efficiency : float
+        Lower bound of the efficiency of the design weights.
     readings : int array, shape (candidates,)
     fitted : Minimum
         The rival refitted to the expected whole readings.
-    chi2_shares : float
-        Chi-squared of the rival refitted to the shares.
+    chi2_weights : float
+        Chi-squared of the rival refitted to the design weights.
     criterion : Misfit
         Criterion at the fit `fitted`.
     unseen : int
         Number of candidates that were left out because the rival has no response at its last fit.
     """
 
-    shares: Shares
-    readings: NDArray[np.int64]
+    efficiency: float
+    readings: Whole
     fitted: Minimum
-    chi2_shares: float
+    chi2_weights: float
     criterion: Misfit
     unseen: int
 
@@ -117,7 +118,7 @@ class RivalFit:
 def separation(
     fits: RivalFit, cost: Float, total: float, progress: Callable[[int, int, str], None]
 ) -> Separation:
-    """Shares and whole readings at which the refitted rival's chi-squared is largest.
+    """Whole readings at which the refitted rival's chi-squared is largest.
 
     Parameters
     ----------
@@ -130,27 +131,25 @@ def separation(
     """
     readings = total / cost
     criterion, _ = fits.criterion(fits.start, readings / readings.size)
-    shares = _cleaned(optimal_shares(criterion, readings).shares)
-    best, efficiency = fits.fitted(shares * readings), 0.0
+    weights = _cleaned(optimal_weights(criterion, readings)[0])
+    best, efficiency = fits.fitted(weights * readings), 0.0
     for round_ in range(_ROUNDS):
         progress(round_, _ROUNDS, "refits of the rival")
-        criterion, _ = fits.criterion(best.u, shares * readings)
-        slope = criterion.gradient(shares * readings) * readings
-        gap = float(slope.max() - shares @ slope)
-        efficiency = criterion.least_efficiency(gap, best.chi2)
+        criterion, _ = fits.criterion(best.u, weights * readings)
+        slope = criterion.gradient(weights * readings) * readings
+        efficiency = criterion.least_efficiency(weights, slope)
         if efficiency >= _ENOUGH:
             break
-        mixed = 0.9 * shares + 0.1 / shares.size
-        proposed = _cleaned(optimal_shares(criterion, readings, start=mixed).shares)
+        proposed = _cleaned(optimal_weights(criterion, readings)[0])
         for part in _PARTS:
-            tried = _cleaned((1 - part) * shares + part * proposed)
+            tried = _cleaned((1 - part) * weights + part * proposed)
             result = fits.fitted(tried * readings, best.u)
             if best.chi2 * (1 + 1e-6) < result.chi2 < np.inf:
-                shares, best = tried, result
+                weights, best = tried, result
                 break
         else:
             break
-    n = whole_readings(criterion, cost, total, shares)
+    n = whole_readings(criterion, cost, total, weights)
     fitted = fits.fitted(n.astype(float), best.u)
     for _ in range(_EXCHANGES):
         progress(_ROUNDS, _ROUNDS, "whole readings")
@@ -161,8 +160,7 @@ def separation(
             break
         n, fitted = changed, again
     last, seen = fits.criterion(fitted.u, n.astype(float))
-    shared = Shares(shares, efficiency)
-    return Separation(shared, n, fitted, best.chi2, last, int((~seen).sum()))
+    return Separation(efficiency, n, fitted, best.chi2, last, int((~seen).sum()))
 
 
 def reached(objective: Objective, u: Float) -> bool:
@@ -170,8 +168,8 @@ def reached(objective: Objective, u: Float) -> bool:
     return math.isfinite(objective.chi2(u)) and objective.expected_decrease(u) < _LEFT
 
 
-def _cleaned(shares: Float) -> Float:
-    kept = np.where(shares > _NEGLIGIBLE, shares, 0.0)
+def _cleaned(weights: Float) -> Float:
+    kept = np.where(weights > _NEGLIGIBLE, weights, 0.0)
     return np.asarray(kept / kept.sum())
 
 
