@@ -155,9 +155,14 @@ def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judge
 
 def test_errors_too_small_exclude_no_law_by_their_size(judged, monkeypatch):
     monkeypatch.setattr(minima, "_FURTHER", 0)
-    comparison = judged("rice-ruina", 3, claimed=1 / 3, laws=LAWS[::2])
+    comparison = judged("rice-ruina", 13, claimed=1 / 3, laws=LAWS[::2])
     assert not comparison.decided
-    assert "too small by a factor of about 3" in comparison.verdict
+    factor = re.search(r"too small by a factor of about ([\d.]+)", comparison.verdict)[1]
+    # Of 77 degrees of freedom: three standard errors are a quarter.
+    assert float(factor) == pytest.approx(3, rel=0.25)
+    # With the claimed errors rice-ruina, which is true, would be excluded.
+    fits = [comparison.laws[name].fit for name in LAWS[::2]]
+    assert fits[0].aicc > fits[1].aicc + 10
     # No other stiffness would describe these data.
     assert "with k free" not in comparison.verdict.lower()
     assert comparison.laws["rice-ruina"].fit.p_value < 1e-3
