@@ -259,6 +259,11 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
         expected = of_run.log_likelihood + math.log(part / whole)
         assert validation.runs[name] == pytest.approx(expected, abs=0.05)
     assert validation.log_density == pytest.approx(sum(validation.runs.values()))
+    # Two tables with the same name are two runs.
+    tables = [table.without(runs == n) for n in ("fast", "slow")]
+    tables = [replace(t, run=np.full(t.rows, "1")) for t in tables]
+    apart = leave_one_run_out(fit(tables, "elasto-plastic", ("eps_ratio",), **given))
+    assert list(apart.runs.values()) == pytest.approx(list(validation.runs.values()))
     # Of one run nothing is left.
     validation = leave_one_run_out(parts[0])
     assert math.isnan(validation.log_density)

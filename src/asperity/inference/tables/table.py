@@ -665,7 +665,22 @@ def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
                 "data must hold each reading once, got {2} of {0} "
                 f"(table {j + 1}) equal to {{1}} of {first.name} (table {i + 1})",
             )
-    run = np.concatenate([np.full(t.rows, i) for i, t in enumerate(tables)])
+    of_table = np.concatenate([np.full(t.rows, i) for i, t in enumerate(tables)])
+    if len(tables) == 1:
+        return tables[0], of_table
+    names = [t.name for t in tables]
+    names = [n if names.count(n) == 1 else f"{n} (table {i})" for i, n in enumerate(names, 1)]
+
+    def named(field: str) -> NDArray[np.str_]:
+        """Names of rows or runs, which differ between tables."""
+        pairs = zip(names, tables, strict=True)
+        return np.array(
+            [
+                name if n == t.name else f"{n} of {name}"
+                for name, t in pairs
+                for n in getattr(t, field)
+            ]
+        )
 
     def stacked(field: str) -> dict[Any, Float]:
         names = dict.fromkeys(n for t in tables for n in getattr(t, field))
@@ -678,13 +693,8 @@ def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
     whole = LockInTable(
         " and ".join(t.name for t in tables),
         **columns,
-        run=np.concatenate([t.run for t in tables]),
+        run=named("run"),
         remarks=tuple(r for t in tables for r in t.remarks),
-        row_names=np.concatenate(
-            [
-                t.row_names if len(tables) == 1 else [f"{n} of {t.name}" for n in t.row_names]
-                for t in tables
-            ]
-        ),
+        row_names=named("row_names"),
     )
-    return whole, run
+    return whole, of_table
