@@ -595,7 +595,7 @@ def log_density(data: Residuals) -> float:
     return -0.5 * (float(np.sum(data.values**2)) + n * math.log(2 * math.pi)) - data.log_scale
 
 
-def aicc_penalty(parameters: int, data: float) -> float:
+def aicc_penalty(parameters: float, data: float) -> float:
     """The term that AICc adds to the deviance; infinite if there are too few data."""
     if not parameters:
         return 0.0

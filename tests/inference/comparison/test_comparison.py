@@ -22,7 +22,7 @@ from click.testing import CliRunner
 from asperity import Slider, periodic_response, samples
 from asperity.cli.main import main
 from asperity.errors import InputError
-from asperity.inference import answers, compare, fit, table_of
+from asperity.inference import Prior, answers, compare, fit, table_of
 from asperity.inference.comparison.compare import judge, laws_table
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
 from asperity.inference.fitting import minima
@@ -268,6 +268,29 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
     validation = leave_one_run_out(parts[0])
     assert math.isnan(validation.log_density)
     assert "one run" in validation.message
+
+
+def test_a_number_with_a_tight_prior_counts_as_fixed(made, pmma):
+    """AICc with 4 parameters and 10 data is 20 above that with one parameter."""
+    table = made("elasto-plastic", 8).without(~np.isin(np.arange(V.size), [6, 13]))
+    numbers = {name: pmma[name].si for name in ("A", "B", "lambda")}
+    given = {"material": pmma, "starts": 1, "check_stiffness": False}
+
+    def with_priors(sd):
+        priors = {name: Prior(value, sd * value, "") for name, value in numbers.items()}
+        return fit(table, "elasto-plastic", (*numbers, "eps_ratio"), prior=priors, **given)
+
+    fixed = fit(table, "elasto-plastic", ("eps_ratio",), fixed=numbers, **given)
+    tight = with_priors(1e-6)
+    assert tight.aicc == pytest.approx(fixed.aicc, abs=1e-3)
+    assert tight.bic == pytest.approx(fixed.bic, abs=1e-3)
+    assert tight.dof == fixed.dof
+    weights = [j.weight for j in judge({"fixed": fixed, "tight": tight}).laws.values()]
+    assert weights == pytest.approx([0.5, 0.5], abs=1e-3)
+    # A prior that says nothing leaves AICc as it is.
+    loose = with_priors(1e6)
+    deviance = -2 * loose.log_likelihood
+    assert loose.aicc - deviance == pytest.approx(8 + 2 * 4 * 5 / 5, abs=1e-3)
 
 
 def test_second_opinions_stand_beside_the_verdict(made, pmma, monkeypatch):

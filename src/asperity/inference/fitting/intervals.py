@@ -148,8 +148,11 @@ class Parabola:
         Parameters that the data do not determine.
     stopped : bool
         Whether chi-squared still falls towards values at which the law has no orbit.
-    fitted, priors : int
-        Number of fitted parameters, including those of the noise, and number of priors.
+    fitted : float
+        Number of parameters, including those of the noise, that the data determine: the trace of
+        I (I + P)^-1, with the information I of the data and P of the priors.
+    priors : int
+        Number of priors.
     judging : float
         Chi-squared of the data with given uncertainties and of priors; of all data if all noise is
         estimated.
@@ -167,7 +170,7 @@ class Parabola:
     unbounded: Float
     undetermined: tuple[str, ...]
     stopped: bool
-    fitted: int
+    fitted: float
     priors: int
     judging: float
     dof: int
@@ -215,8 +218,8 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         if not unknown.nuisance
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > unknown.widest(u[i]))
     )
-    fitted = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
-    judging, dof = chi2, r.size - fitted
+    parameters = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
+    judging, dof = chi2, r.size - parameters
     given = [term.profiled == 0 for term in objective.terms]
     if any(given) and not all(given):
         # Innovations have unit variance by their estimated noise, and would hide a misfit.
@@ -235,7 +238,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         unbounded=u - covariance @ _gradient_at_bounds(objective, u, covariance, J.T @ r),
         undetermined=undetermined,
         stopped=objective.noise_is_known and objective.expected_decrease(u) > _STOPPED,
-        fitted=fitted,
+        fitted=parameters - float(leverages(J[r.size - len(with_prior) :], J.T @ J).sum()),
         priors=len(with_prior),
         judging=judging,
         dof=dof,
