@@ -69,7 +69,25 @@ def test_a_prior_of_the_stiffness_may_be_over_the_load():
     free = {"free": ["lambda", "K"], "fixed": {"eps_ratio": 0.5}, "values": {"K": "0.2 N/um"}}
     plan = plan_of(changed(**free, prior=["K=0.03+-0.001 1/um"]), require_unit=True)
     (prior,) = (u.prior for u in plan.truth.unknowns if u.name == "K")
-    assert (prior.mean, prior.sd) == pytest.approx((2.1e5, 7e3))
+    assert prior.sd == pytest.approx(7e3)
+
+
+def test_a_prior_is_about_the_value_that_the_readings_follow():
+    """Its mean counted as misfit of the rival alone: (0.6 - 0.5)^2 / 0.01^2 = 100."""
+    priors = {
+        "eps_ratio": {"mean": 0.6, "std": 0.01},
+        "A": {"mean": 0.02, "std": 0.001},
+        "c": {"mean": 2.0, "std": 0.1},
+    }
+    free = {"rival": "nagata", "rival_free": ["eps_ratio", "A", "c"], "values__c": 3.0}
+    plan = plan_of(changed(measure=None, **free, prior=priors))
+    of_law, of_rival = (
+        {u.name: u.prior.mean for u in h.unknowns if u.prior} for h in (plan.truth, plan.rival)
+    )
+    assert of_law == {"eps_ratio": 0.5}
+    # A is a fixed number of the law; the law has no c.
+    assert of_rival == {"eps_ratio": 0.5, "A": 0.013, "c": 2.0}
+    assert plan.priors == {"eps_ratio": True, "A": True, "c": False}
 
 
 def test_a_prior_of_a_file_carries_its_unit():

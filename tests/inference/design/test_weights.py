@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from scipy.special import ndtr
 
 from asperity.inference.design.criteria import Determinant, Misfit
 from asperity.inference.design.rival import probability_of_deciding
@@ -200,6 +201,26 @@ def test_readings_that_do_not_determine_a_parameter_have_a_finite_criterion():
 @pytest.mark.parametrize(("readings", "probability"), [(4.0, 0.0), (5.0, 1.0)])
 def test_a_rival_without_an_aicc_is_not_excluded(readings, probability):
     """Three parameters need five data; residuals of 1,000 exclude the rival then."""
-    law, rival = np.ones((1, 1, 1)), np.zeros((1, 1, 3))
-    misfit = Misfit(np.full((1, 1), 1e3), rival, np.zeros(0), np.zeros((0, 3)))
-    assert probability_of_deciding(law, misfit, np.array([readings]), 0) == probability
+    law = Misfit(np.zeros((1, 1)), np.ones((1, 1, 1)), np.zeros(0), NO_PRIOR[:, :1])
+    rival = Misfit(np.full((1, 1), 1e3), np.zeros((1, 1, 3)), np.zeros(0), NO_PRIOR[:, :3])
+    assert probability_of_deciding(law, rival, np.array([readings]), 0) == probability
+
+
+def test_priors_count_in_the_probability_of_deciding_as_in_a_fit():
+    """Nine readings of a constant: the rival fixes it to a third of 4 standard errors less.
+
+    A parameter with a tight prior is a fixed number: the difference of chi-squared is 16 - 8 z.
+    """
+
+    def constant(value, jacobian, prior):
+        misfit = np.full((9, 1), value)
+        jacobian, prior = np.full((9, 1, 1), jacobian), np.full((1, 1), prior)
+        return Misfit(misfit, jacobian, np.zeros(1), prior)
+
+    law, n = constant(0.0, 1.0, 1e6), np.ones(9)
+    # Without a prior the parameter of the rival, which has no influence, counts 2 + 4/7 in AICc.
+    for prior, penalty in ((1e6, 0.0), (0.0, 2 + 4 / 7)):
+        probability = probability_of_deciding(law, constant(4 / 3, 0.0, prior), n, 0, [True])
+        expected = ndtr((16 + penalty - 10) / 8)
+        assert probability == pytest.approx(expected, abs=0.01)
+    assert probability_of_deciding(law, law, n, 0, [True]) == 0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -25,10 +25,11 @@ from asperity.inference.design.candidates import (
     some_of,
     with_readings,
 )
-from asperity.inference.design.criteria import Determinant
+from asperity.inference.design.criteria import Determinant, Misfit
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
 from asperity.inference.design.rival import (
     RivalFit,
+    prior_rows,
     probability_of_deciding,
     reached,
     separation,
@@ -43,10 +44,10 @@ from asperity.inference.design.weights import (
 )
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.fitting.result import Warned
-from asperity.inference.objective import Minimum, Objective, aicc_penalty
+from asperity.inference.objective import Objective, aicc_penalty
+from asperity.inference.tables.residuals import leverages
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import Unknown
 from asperity.parameters.arguments import at_least, typed
 
 
@@ -431,8 +432,13 @@ class _Task:
             got, advice = f"'{name}', which gives the same with {values}", "exchange the two laws"
             raise InputError(field, rule, got, f"{advice}, or fix some of its parameters")
         on_grid = fits.fitted(grid, best.u)
+        u = plan.truth.coordinates(expected_values(plan.truth))
+        law = Misfit(
+            np.zeros(self.jacobian.shape[:2]), self.jacobian, *prior_rows(plan, plan.truth, u)
+        )
+        drawn = list(plan.priors.values())
         probable, probable_on_grid = (
-            probability_of_deciding(self.jacobian, linear, readings, plan.question.seed)
+            probability_of_deciding(law, linear, readings, plan.question.seed, drawn)
             if fits.reached(readings, end)
             else None
             for readings, end, linear in (
@@ -592,25 +598,23 @@ class _Task:
         plan, random = self.plan, np.random.default_rng(self.plan.question.seed)
         counts, readings = n[n > 0], self.expected.without(n <= 0)
         truth = with_readings(plan, plan.truth, readings, counts)
-        u, estimates, behind = truth.coordinates(expected_values(truth)), [], []
-        data = float(counts.sum()) * len(plan.noise)
+        hypotheses = [(truth, truth.coordinates(expected_values(truth)))]
         if rival is not None:
-            theirs, nearest = rival[0].to(n), rival[1]
+            hypotheses.append((rival[0].to(n), rival[1]))
+        estimates, behind = [], []
         for done in range(sets):
             self.report(done, sets, "synthetic sets")
             normal = random.normal(size=(readings.rows, len(OBSERVABLES)))
             drawn = readings.disturbed(readings.values, normal / np.sqrt(counts)[:, None])
-            shifted = tuple(_with_drawn_prior(unknown, random) for unknown in truth.unknowns)
-            end = _refitted(replace(truth, unknowns=shifted), drawn, counts, u)
-            other = None if rival is None else _refitted(theirs, drawn, counts, nearest)
-            if end is None or (rival is not None and other is None):
+            errors = {name: known * random.normal() for name, known in plan.priors.items()}
+            fits = [_refitted(h, drawn, errors, counts, begin) for h, begin in hypotheses]
+            ends = [fit for fit in fits if fit is not None]
+            if len(ends) < len(fits):
                 continue
-            estimates.append(list(truth.named(end.u).values()))
-            if other is not None:
-                of_rival, of_law = aicc_penalty(len(nearest), data), aicc_penalty(len(u), data)
-                together = math.isfinite(of_rival + of_law)
-                behind.append(other.chi2 - end.chi2 + of_rival - of_law if together else 0.0)
-        columns = np.array(estimates).reshape(-1, len(u)).T
+            estimates.append(list(truth.named(ends[0].u).values()))
+            aicc = [end.aicc for end in ends]
+            behind.append(aicc[-1] - aicc[0] if np.isfinite(aicc).all() else 0.0)
+        columns = np.array(estimates).reshape(-1, len(truth.names)).T
         spreads = {
             name: _spread(column, random) for name, column in zip(truth.names, columns, strict=True)
         }
@@ -619,27 +623,54 @@ class _Task:
             sets - columns.shape[1],
             {name: spread for name, (spread, _) in spreads.items()},
             {name: error for name, (_, error) in spreads.items()},
-            float((np.array(behind) >= EXCLUDED).mean()) if behind else None,
+            float((np.array(behind) >= EXCLUDED).mean()) if rival and behind else None,
         )
 
 
-def _with_drawn_prior(unknown: Unknown, random: np.random.Generator) -> Unknown:
-    """The prior with a mean drawn about the expected value, as from another measurement."""
-    if unknown.prior is None:
-        return unknown
-    mean = unknown.middle + unknown.prior.sd * random.normal()
-    return replace(unknown, prior=replace(unknown.prior, mean=mean))
+class _Refit(NamedTuple):
+    """The minimum for synthetic readings, in coordinates, and its AICc up to a constant."""
+
+    u: Float
+    aicc: float
 
 
 def _refitted(
-    objective: Objective, readings: LockInTable, counts: Float, u: Float
-) -> Minimum | None:
-    """The minimum for other readings at the same points; None if it was not reached."""
+    objective: Objective,
+    readings: LockInTable,
+    errors: Mapping[str, float],
+    counts: Float,
+    u: Float,
+) -> _Refit | None:
+    """The fit to other readings at the same points; None if no minimum was reached.
+
+    Parameters
+    ----------
+    objective : Objective
+    readings : LockInTable
+    errors : mapping of str to float
+        Errors of the means of priors, in standard deviations.
+    counts : array, shape (rows,)
+    u : array, shape (n,)
+        Start.
+    """
     (term,) = objective.terms_of(LockInTerm)
-    other = term.with_table(readings).weighted(np.sqrt(counts))
-    objective = replace(objective, terms=(other,))
+    unknowns = tuple(
+        replace(k, prior=replace(k.prior, mean=k.prior.mean + k.prior.sd * errors[k.name]))
+        if k.prior
+        else k
+        for k in objective.unknowns
+    )
+    term = term.with_table(readings).weighted(np.sqrt(counts))
+    objective = replace(objective, terms=(term,), unknowns=unknowns)
     end = objective.minimise(u)
-    return end if reached(objective, end.u) else None
+    if not reached(objective, end.u):
+        return None
+    priors, slopes = objective.prior_residuals(end.u)
+    jacobian = objective.residuals(end.u)[1]
+    # As in a fit: priors count neither as data nor, by their leverage, as parameters.
+    parameters = u.size - float(leverages(slopes, jacobian.T @ jacobian).sum())
+    data = float(counts.sum()) * len(readings.observables)
+    return _Refit(end.u, end.chi2 - float(priors @ priors) + aicc_penalty(parameters, data))
 
 
 def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:

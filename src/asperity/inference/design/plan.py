@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,6 +90,13 @@ class DesignPlan:
     truth: Objective
     rival: Objective | None
     uncertainty: Mapping[str, float]
+
+    @property
+    def priors(self) -> dict[str, bool]:
+        """Names of all priors, and whether the parameter is one of the law of the readings."""
+        of_law = {*self.truth.fixed, *self.truth.names}
+        both = (*self.truth.unknowns, *(self.rival.unknowns if self.rival else ()))
+        return {u.name: u.name in of_law for u in both if u.prior}
 
     @property
     def motion(self) -> dict[str, bool]:
@@ -194,6 +201,8 @@ def _checked(question: Design, name: str) -> DesignPlan:
     require_free_names(known_to_both, None, {n: p for n, p in question.prior.items() if p})
     noise = _noise(question)
     uncertainty = _uncertainties(question, known, material, truth)
+    expected = {**truth.fixed, **expected_values(truth)}
+    truth, rival = (h and _with_expected_priors(h, expected) for h in (truth, rival))
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
     require_motion(truth.names, plan.motion)
     for label in ("values", "fixed", "ranges"):
@@ -344,6 +353,21 @@ def _hypothesis(
     unknowns = unknowns_of(law, free, largest_epsilon=largest, start=start, priors=priors)
     constants = {n: float(v) for n, v in constants.items() if n not in table.points}
     return Objective((), law, unknowns, constants)
+
+
+def _with_expected_priors(hypothesis: Objective, expected: Mapping[str, float]) -> Objective:
+    """The hypothesis with the means of its priors at the values that the readings follow.
+
+    A prior is another measurement of the same interface. A mean of a parameter that only a rival
+    has stays as it is.
+    """
+    unknowns = tuple(
+        replace(u, prior=replace(u.prior, mean=expected.get(u.name, u.prior.mean)))
+        if u.prior
+        else u
+        for u in hypothesis.unknowns
+    )
+    return replace(hypothesis, unknowns=unknowns)
 
 
 def _uncertainties(

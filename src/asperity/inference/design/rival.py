@@ -10,7 +10,7 @@ the rival follows from the linear predictions of both laws.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -109,7 +109,7 @@ class RivalFit:
         residual, jacobian = differences(self.rival, self.expected, at, values)
         # A point without a response has no information.
         residual = np.where(at.seen[:, None], residual, 0.0)
-        prior, prior_slopes = self.rival.prior_residuals(u)
+        prior, prior_slopes = prior_rows(self.plan, self.rival, u)
         slope = np.einsum("i,im,imp->p", n, residual, jacobian) + prior @ prior_slopes
         moving = ~self.rival.active_bounds(u, slope)
         return Misfit(residual, jacobian * moving, prior, prior_slopes * moving), at.seen
@@ -173,7 +173,19 @@ def _cleaned(weights: Float) -> Float:
     return np.asarray(kept / kept.sum())
 
 
-def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, seed: int) -> float:
+def prior_rows(plan: DesignPlan, hypothesis: Objective, u: Float) -> tuple[Float, Float]:
+    """Residuals of all priors of a plan, and their derivatives; 0 for those of the other law."""
+    values, slopes = hypothesis.prior_residuals(u)
+    names = list(plan.priors)
+    at = [names.index(k.name) for k in hypothesis.unknowns if k.prior]
+    residuals, jacobian = np.zeros(len(names)), np.zeros((len(names), u.size))
+    residuals[at], jacobian[at] = values, slopes
+    return residuals, jacobian
+
+
+def probability_of_deciding(
+    law: Misfit, rival: Misfit, readings: Float, seed: int, drawn: Sequence[bool] = ()
+) -> float:
     """Probability that the rival's AICc exceeds that of the true law enough to exclude it.
 
     Both laws are linear in their parameters about their fits to the expected readings, so that the
@@ -181,35 +193,31 @@ def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, see
 
     Parameters
     ----------
-    jacobian : array, shape (candidates, m, p)
-        Jacobian of the true law, in standard uncertainties of a reading.
-    rival : Misfit
-        Criterion at the rival's fit to the expected readings.
+    law, rival : Misfit
+        Criteria at the fits to the expected readings, with the same priors.
     readings : array, shape (candidates,)
     seed : int
+    drawn : sequence of bool, shape (priors,)
+        Whether the mean of each prior has errors: it is a measurement of the true law.
     """
     rows = np.flatnonzero(readings > 0)
-    root = np.sqrt(readings[rows])[:, None]
-    apart = (rival.residual[rows] * root).ravel()
+    size = rows.size * rival.residual.shape[1]
     data = round(float(readings[rows].sum())) * rival.residual.shape[1]
-    q = rival.prior_residual.size
-    law_columns = (jacobian[rows] * root[..., None]).reshape(apart.size, -1)
-    rival_columns = (rival.jacobian[rows] * root[..., None]).reshape(apart.size, -1)
-    apart = np.concatenate([apart, rival.prior_residual])
-    law_columns = np.vstack([law_columns, np.zeros((q, law_columns.shape[1]))])
-    rival_columns = np.vstack([rival_columns, rival.prior_jacobian])
-    noise = np.random.default_rng(seed).normal(size=(_DRAWS, apart.size))
-    noise[:, apart.size - q :] = 0.0
-    difference = _outside(rival_columns, apart - noise) - _outside(law_columns, noise)
-    of_rival, of_law = (aicc_penalty(a.shape[1], data) for a in (rival_columns, law_columns))
+    noise = np.random.default_rng(seed).normal(size=(_DRAWS, size + len(drawn)))
+    noise[:, size:] *= drawn
+    root = np.sqrt(readings[rows])[:, None]
+    aicc = []
+    for fit in (law, rival):
+        apart = np.append(fit.residual[rows] * root, fit.prior_residual)
+        columns = (fit.jacobian[rows] * root[..., None]).reshape(size, -1)
+        columns = np.vstack([columns, fit.prior_jacobian])
+        u, s, _ = np.linalg.svd(columns, full_matrices=False)
+        basis = u[:, s > 1e-12 * max(float(s.max(initial=0.0)), 1e-300)]
+        outside = apart - noise
+        outside = outside - (outside @ basis) @ basis.T
+        # As in a fit: priors count neither as data nor, by their leverage, as parameters.
+        parameters = columns.shape[1] - float(np.sum(basis[size:] ** 2))
+        aicc.append((outside[:, :size] ** 2).sum(1) + aicc_penalty(parameters, data))
     # Laws with as many parameters as data, or one less, are not compared.
-    together = math.isfinite(of_rival + of_law)
-    return float((difference + of_rival - of_law >= EXCLUDED).mean()) if together else 0.0
-
-
-def _outside(jacobian: Float, vectors: Float) -> Float:
-    """Squared norm of the part of each vector outside the columns of the Jacobian."""
-    u, s, _ = np.linalg.svd(jacobian, full_matrices=False)
-    basis = u[:, s > 1e-12 * max(float(s.max(initial=0.0)), 1e-300)]
-    inside = vectors @ basis
-    return np.asarray((vectors**2).sum(1) - (inside**2).sum(1))
+    together = np.isfinite(aicc).all()
+    return float((aicc[1] - aicc[0] >= EXCLUDED).mean()) if together else 0.0
