@@ -61,18 +61,25 @@ def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
     """
     import h5netcdf
 
-    new = not done
-    with writable(path), h5netcdf.File(path, "w" if new else "r+") as file:
-        if new:
-            _lay_out(file, block)
-        begin = {name: done.get(name, 0) for name in CHUNKS}
-        end = {name: begin[name] + block.sizes[name] for name in CHUNKS}
-        for dimension, length in end.items():
-            file.resize_dimension(dimension, length)
-        for name, variable in block.variables.items():
-            head = str(variable.dims[0])
-            if head in CHUNKS and variable.sizes[head]:
-                file.variables[name][begin[head] : end[head]] = _as_stored(variable.values)
+    with writable(path):
+        if not done:
+            # Without a fill value, which every reader would take for a missing row.
+            stored: dict[Any, Any] = {name: {"_FillValue": None} for name in block.variables}
+            for name, variable in block.variables.items():
+                if variable.dims[0] in CHUNKS:
+                    sizes = (CHUNKS.get(str(d), block.sizes[d]) for d in variable.dims)
+                    stored[name]["chunksizes"] = tuple(sizes)
+            block.to_netcdf(path, engine="h5netcdf", unlimited_dims=CHUNKS, encoding=stored)
+            return
+        with h5netcdf.File(path, "r+") as file:
+            for dimension in CHUNKS:
+                file.resize_dimension(dimension, done[dimension] + block.sizes[dimension])
+            for name, variable in block.variables.items():
+                head = str(variable.dims[0])
+                if head in CHUNKS and variable.size:
+                    values = variable.values
+                    text = values.dtype.kind == "U"
+                    file.variables[name][done[head] :] = values.astype(object) if text else values
 
 
 def describe(path: Path, attributes: Mapping[str, Any]) -> None:
@@ -81,32 +88,6 @@ def describe(path: Path, attributes: Mapping[str, Any]) -> None:
 
     with h5netcdf.File(path, "r+") as file:
         file.attrs.update(attributes)
-
-
-def _lay_out(file: Any, block: xarray.Dataset) -> None:
-    import h5py
-
-    file.dimensions = {
-        str(name): None if name in CHUNKS else size for name, size in block.sizes.items()
-    }
-    file.attrs.update(block.attrs)
-    for name, variable in block.variables.items():
-        text = variable.dtype.kind in "UO"
-        shape = tuple(CHUNKS.get(str(d), block.sizes[d]) for d in variable.dims)
-        made = file.create_variable(
-            name,
-            variable.dims,
-            dtype=h5py.string_dtype() if text else variable.dtype,
-            chunks=shape if variable.dims[0] in CHUNKS else None,
-        )
-        for key, value in variable.attrs.items():
-            made.attrs[key] = value
-        if variable.dims[0] not in CHUNKS:
-            made[...] = _as_stored(variable.values)
-
-
-def _as_stored(values: np.ndarray) -> np.ndarray:
-    return values.astype(object) if values.dtype.kind == "U" else values
 
 
 @dataclass(frozen=True, eq=False)
