@@ -10,7 +10,7 @@ milliseconds a row: the first minimisations then use few rows of the table on a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from operator import attrgetter
 
@@ -26,8 +26,6 @@ from asperity.parameters.arguments import counted
 
 #: Called with the number of finished minimisations and of all minimisations.
 Progress = Callable[[int, int], None]
-#: Sort key of minima.
-_CHI2 = attrgetter("chi2")
 #: Random starts from which chi-squared is minimised, in addition to the given start.
 _MINIMISED = 3
 #: Minima that differ by less in every coordinate are the same; the second number is for the coarse
@@ -140,8 +138,8 @@ def _by_solved_rows(
             break
         new = _rough_minimum(partial, start)
         if math.isfinite(new.chi2) and _is_new(new, ends):
-            ends = sorted([*ends, new], key=_CHI2)
-            minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
+            ends = best_first([*ends, new])
+            minima = best_first([*minima, *_on_all_rows(objective, [new])])
     minima = distinct(minima)
     far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
@@ -263,7 +261,7 @@ def _minimised_from(
     for start in starts:
         minima.append(objective.minimise(start, tolerance=tolerance, evaluations=evaluations))
         advance(1)
-    return sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2)
+    return best_first(minima)
 
 
 def _rough_minimum(
@@ -298,8 +296,7 @@ def _by_few_rows(
     further &= not _describes(coarse, roughly)
     others = _further(objective, drawn, chi2, starts)[: _FURTHER_WITH_SEARCH * further]
     for new in _rough_minima_by_smoother(coarse, others):
-        if math.isfinite(new.chi2):
-            roughly = sorted([*roughly, new], key=_CHI2)
+        roughly = best_first([*roughly, new])
         if _describes(coarse, roughly):
             break
     # A law that is far off for few rows does not describe all of them.
@@ -308,16 +305,18 @@ def _by_few_rows(
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
     if minima or (again and far_off):
-        return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
+        return best_first([*minima, *map(objective.minimise, again)])
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
     if far_off:
-        best_first = (drawn[i] for i in np.argsort(chi2))
-        solved = (u for u in best_first if math.isfinite(objective.chi2(u)))
+        in_order = (drawn[i] for i in np.argsort(chi2))
+        solved = (u for u in in_order if math.isfinite(objective.chi2(u)))
         ends = [_minimised_near(objective, u, [], far_off=True) for u in islice(solved, 1)]
     else:
         chi2 = objective.chi2_of_many(np.array(drawn))
         ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
-    return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
+    return best_first(
+        end if _far_off(objective, end) else objective.minimise(end.u) for end in ends
+    )
 
 
 def _roughly_minimised(
@@ -352,12 +351,12 @@ def _on_all_rows(
         if minima and end.chi2 > highest:
             break
         near = _rough_minimum(coarser, end.u)
-        if len(distinct([*before, near], _SAME_COARSE)) == len(before):
-            continue  # the minimum of an earlier end
+        if not _is_new(near, before):
+            continue
         before.append(near)
         far = _far_off(coarser, near)
         minima.append(_minimised_near(objective, near.u, minima, far_off=far))
-    return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
+    return distinct(best_first(minima))
 
 
 def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
@@ -393,9 +392,9 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
                 if end.chi2 < highest and side * (end.u[i] - best[i]) > math.log(_SAME_LENGTH)
             ]
             if apart:
-                u = min(apart, key=_CHI2).u
+                u = best_first(apart)[0].u
                 others.append(_minimised_near(objective, u, [*minima, *others]))
-    return sorted([*minima, *others], key=_CHI2)
+    return best_first([*minima, *others])
 
 
 def _readable(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
@@ -440,6 +439,11 @@ def _without_free_parameters(objective: Objective) -> list[Minimum]:
         objective.use_search(True)
         chi2 = objective.chi2(nowhere)
     return [Minimum(nowhere, chi2)] if math.isfinite(chi2) else []
+
+
+def best_first(minima: Iterable[Minimum]) -> list[Minimum]:
+    """Minima with a solution, in the order of chi-squared."""
+    return sorted((m for m in minima if math.isfinite(m.chi2)), key=attrgetter("chi2"))
 
 
 def distinct(minima: list[Minimum], same: float = _SAME) -> list[Minimum]:
