@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 import numpy as np
@@ -120,21 +120,9 @@ class Coordinates(NamedTuple):
         return np.where(outside, -np.inf, np.asarray(self.log_prior(u)) + self.log_norm)
 
 
-class DensityData(NamedTuple):
-    """Arrays of the density; programs are compiled for their shapes.
-
-    Attributes
-    ----------
-    mode, root : array, shapes (n,) and (n, n)
-    coordinates : Coordinates
-    terms : tuple
-        Arrays of each data term, for its residuals.
-    """
-
-    mode: Any
-    root: Any
-    coordinates: Coordinates
-    terms: tuple[Any, ...]
+#: Arrays of the density, for whose shapes programs are compiled: mode and root, shapes (n,) and
+#: (n, n), coordinates, and the arrays of each data term.
+DensityData: TypeAlias = tuple[Any, Any, Coordinates, tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
@@ -154,11 +142,12 @@ class PosteriorDensity:
 
     def __call__(self, z: Array, data: DensityData) -> Array:
         """Log density at z, of shape (n,)."""
-        q = data.mode + data.root @ z
-        u = data.coordinates.to_u(q)
-        total = data.coordinates.log_prior(u) + jnp.sum(data.coordinates.log_slope(q))
-        values = dict(zip(self.names, data.coordinates.values(u), strict=True))
-        for residuals, arrays in zip(self.residuals, data.terms, strict=True):
+        mode, root, coordinates, terms = data
+        q = mode + root @ z
+        u = coordinates.to_u(q)
+        total = coordinates.log_prior(u) + jnp.sum(coordinates.log_slope(q))
+        values = dict(zip(self.names, coordinates.values(u), strict=True))
+        for residuals, arrays in zip(self.residuals, terms, strict=True):
             total = total - 0.5 * jnp.sum(residuals(values, arrays) ** 2)
         return total
 
@@ -171,8 +160,8 @@ class Whitened:
     ----------
     objective : Objective
     coordinates : Coordinates
-    mode, root : array
-        As in `DensityData`.
+    mode, root : array, shapes (n,) and (n, n)
+        q = mode + root @ z.
     """
 
     objective: Objective
@@ -253,7 +242,7 @@ class Whitened:
         """The density as a compiled program evaluates it, and its data."""
         parts = [term.compiled(self.objective.names) for term in self.objective.terms]
         residuals, arrays = zip(*parts, strict=True)
-        data = DensityData(self.mode, self.root, self.coordinates, arrays)
+        data = (self.mode, self.root, self.coordinates, arrays)
         return PosteriorDensity(self.objective.names, residuals), data
 
 
