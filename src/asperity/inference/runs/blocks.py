@@ -23,10 +23,12 @@ from scipy.special import chdtrc
 
 from asperity.arrays import Float
 from asperity.errors import require
-from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
+from asperity.inference.runs.run import Blocks, RecordedRun
 from asperity.recording.defects.lines import find_lines, subtract_line
 from asperity.units import to_si
 
+#: Largest number of samples that are compared one by one.
+LONGEST = 20_000
 #: Smallest and largest number of blocks of a recording.
 _FEWEST, _MOST = 2_000, 100_000
 #: Number of block means for the search for starts.

@@ -1,13 +1,12 @@
 """Drive of a recording: pulling velocity and load over time.
 
 The velocity is piecewise constant, the load piecewise linear. Derivatives with respect to the
-delays of changes are exact: a delay moves the pieces on both sides. The velocities are measured or
-given.
+delays of changes are exact: a delay moves the pieces on both sides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -15,15 +14,7 @@ import numpy as np
 from jax import Array
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError, require
 from asperity.loads import Excitation
-from asperity.measurement.sliding.segments import (
-    Partition,
-    partition,
-    partition_at,
-    require_cuts,
-)
-from asperity.measurement.sliding.signals import SlidingSignals
 
 
 class Drive(NamedTuple):
@@ -84,71 +75,3 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
         w_slope=ratio * drive.load_slope[piece],
         pull=drive.pull[piece],
     )
-
-
-def constant_velocities(
-    signals: SlidingSignals,
-    name: str,
-    steps: Sequence[float] | None,
-    velocities: Sequence[float] | None,
-) -> Partition:
-    """Segments in which the drive has a constant velocity, positive, or rests.
-
-    Parameters as in `recorded_run`.
-
-    Raises
-    ------
-    InputError
-        If the numbers of velocities and segments differ, if the motion of the drive is neither
-        recorded nor given, if the recording begins with a hold, or if the direction reverses.
-    """
-    result = _given_or_measured(signals, name, steps, velocities)
-    both = list(zip(result.velocities, result.holds, strict=True))
-    moving = [v for v, hold in both if not hold]
-    if not moving or result.holds[0]:
-        raise InputError(
-            f"{name} must begin with sliding at a constant velocity, got "
-            f"{'no sliding' if not moving else 'a hold'}; give a window that does"
-        )
-    sign = float(np.sign(moving[0]))
-    advice = "give another channel of the displacement, or a window that slides"
-    require(sign != 0, f"the displacement of {name}", "move", "noise alone", advice)
-    if any(sign * v <= 0 for v in moving):
-        raise InputError(
-            f"{name} must slide in one direction, got a reversal; give a window without"
-        )
-    speeds = [0.0 if hold else sign * float(v) for v, hold in both]
-    # Two neighbouring holds are joined.
-    kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
-    speeds = [speeds[0], *(speeds[k + 1] for k in kept)]
-    return Partition(
-        tuple(result.cuts[k] for k in kept),
-        tuple(speeds),
-        tuple(v == 0 for v in speeds),
-        result.doubts,
-    )
-
-
-def _given_or_measured(
-    signals: SlidingSignals,
-    name: str,
-    steps: Sequence[float] | None,
-    velocities: Sequence[float] | None,
-) -> Partition:
-    """The segments, with signed velocities."""
-    time, displacement = signals.time, signals.displacement
-    if velocities is not None and (steps is None or len(velocities) != len(steps) + 1):
-        got = f"{len(velocities)} for {len(steps or ())}"
-        raise InputError("velocities", "be one more than the steps", got, "give both")
-    if displacement is None and velocities is None:
-        raise InputError(
-            name,
-            "have the displacement or velocity of the drive",
-            f"none: {signals.no_motion}",
-            f"name a channel, like {Argument('columns', 'displacement', 'x')}, or give "
-            f"{Argument('steps')} and {Argument('velocities')}",
-        )
-    if steps is None:
-        return partition(time, displacement)
-    require_cuts(time, steps, "steps")
-    return partition_at(time, displacement, np.array(steps), velocities)

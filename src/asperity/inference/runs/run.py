@@ -5,44 +5,31 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import solveh_banded
-from scipy.optimize import minimize_scalar
-from scipy.special import ndtri
 
 from asperity.arrays import Float, Index
 from asperity.errors import InputError, require
-from asperity.inference.runs.drive import Drive, constant_velocities
+from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.levels import LevelRate, level_rates
-from asperity.measurement.samples import compressive, load_channel, shear_channel
-from asperity.measurement.sliding.segments import Cut
+from asperity.inference.runs.recorded_drive import (
+    constant_velocities,
+    cut_uncertainty,
+    joined_drive,
+    load_course,
+)
+from asperity.measurement.samples import load_channel, shear_channel
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
 from asperity.recording.defects.sampling import even_times, rate_stretches
 from asperity.recording.readers import read
-from asperity.units import KINDS, quantity_text
+from asperity.units import KINDS
 
 #: Kind of quantity of a stiffness, by the unit of the load.
 STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
-#: A load that varies by less than this share of its mean is taken as constant.
-_CONSTANT_LOAD = 1e-3
-#: The piecewise linear load follows the recorded load to this many standard deviations of its
-#: noise.
-_LOAD_NOISE = 5.0
-#: Two corners of the load closer than this many samples may be one.
-_CORNERS_MERGE = 5
-#: Number of samples on each side of a corner from which its time is computed.
-_SAMPLES_NEAR_CORNER = 50
-#: Largest number of samples that are compared one by one.
-LONGEST = 20_000
-#: For longer recordings: number of blocks over which the load between its quick changes is
-#: averaged, and probability that noise moves a sample beyond the limit.
-_LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
 #: Friction above this is a mistake of units.
 _LARGEST_FRICTION = 5.0
 
@@ -219,24 +206,17 @@ def recorded_run(
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
     segments = constant_velocities(signals, label, steps, velocities)
-    speeds, doubts = segments.velocities, list(segments.doubts)
-    origin = float(time[0])
-    cut_times = [cut.time - origin for cut in segments.cuts]
+    course = load_course(trace, load, label, signals)
+    drive, cuts = joined_drive(time, segments, course)
+    origin, speeds = float(time[0]), segments.velocities
     times = time - origin
-    W, unit, varies, knots, load_values = _load(trace, load, label, time, signals.load_unit)
-    cut_times = _with_corners(times, cut_times, knots - origin)
-    drive, cuts = _drive(times, cut_times, speeds, knots - origin, load_values / W)
-    slip = np.interp(
-        times,
-        [0.0, *cut_times, times[-1]],
-        np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
-    )
+    slip_at_edges = speeds[0] * np.append(0.0, np.cumsum(drive.pull * np.diff(drive.edges)))
     # No recorder resolves 1e-9 of its range.
     changes = bool(np.ptp(friction) > 1e-9 * np.abs(friction).max())
     got = f"{friction[0]:.6g} throughout"
     advice = "it holds nothing to fit; name the channel of the shear force"
     require(changes, f"the friction of {label}", "vary", got, advice)
-    doubts += [finding.sentence for finding in signals.signs]
+    doubts = [*segments.doubts, *(finding.sentence for finding in signals.signs)]
     doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)
     if signals.left_out:
@@ -248,22 +228,24 @@ def recorded_run(
         name=label,
         time=times,
         friction=friction,
-        slip=slip,
+        slip=np.interp(times, drive.edges, slip_at_edges),
         drive=drive,
-        cuts=tuple(cuts),
-        cut_uncertainty=_cut_uncertainty(time, segments.cuts),
+        cuts=cuts,
+        cut_uncertainty=cut_uncertainty(time, segments.cuts),
         velocity=speeds[0],
         velocities=speeds,
         origin=origin,
-        W0=W,
-        load_unit=unit,
-        load_varies=varies,
+        W0=float(course.values[0]),
+        load_unit=course.unit,
+        load_varies=bool(np.ptp(course.values) > 0),
         stretches=rate_stretches(times),
         doubts=tuple(doubts),
         spikes=_sample_times(spikes, origin, times, "spikes"),
         jumps=_sample_times(jumps, origin, times, "jumps"),
         wrong=None if spikes is None else (),
-        level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
+        level_rates=level_rates(
+            times, friction, drive.load_at(times), drive.edges[list(cuts)], speeds
+        ),
     )
 
 
@@ -286,16 +268,6 @@ def _sample_times(
             raise InputError(name, "lie inside the recording", f"{at:.10g} s", advice)
         result.append(float(times[k]))
     return tuple(sorted(result))
-
-
-def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
-    """Standard uncertainty of the time of each cut (s)."""
-    uncertain = []
-    for cut in cuts:
-        i = int(np.clip(np.searchsorted(time, cut.time), 1, time.size - 1))
-        interval = float(np.median(np.diff(time[max(0, i - 3) : i + 3])))
-        uncertain.append(max(interval, cut.doubt / 2))
-    return tuple(uncertain)
 
 
 def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | None) -> list[str]:
@@ -337,235 +309,3 @@ def strange_friction(friction: Float) -> list[str]:
             "more digits"
         )
     return sentences
-
-
-def recorded_load(
-    trace: Trace, load: str, time: Float, subject: str, advice: str
-) -> tuple[Float, Float] | None:
-    """Times and load, positive in compression, of the samples within the span of `time`.
-
-    None if no load is recorded.
-
-    Raises
-    ------
-    InputError
-        If the load is not positive.
-    """
-    channel = load_channel(trace, load)
-    if channel is None:
-        return None
-    good = np.isfinite(channel.values) & (trace.time >= time[0]) & (trace.time <= time[-1])
-    t, W = trace.time[good], compressive(channel.values[good], channel.values[good])[0]
-    if t.size < 2:
-        return None
-    if not (W > 0).all():
-        lowest = int(np.argmin(W))
-        got = f"{quantity_text(W[lowest], channel.unit)} at {t[lowest]:.6g} s"
-        raise InputError(subject, "be under a positive load", got, advice)
-    order = np.argsort(t, kind="stable")
-    return t[order], W[order]
-
-
-def _load(
-    trace: Trace, load: str, name: str, time: Float, unit: str
-) -> tuple[float, str, bool, Float, Float]:
-    """Load at the first sample, its unit, whether it varies, and its piecewise linear course."""
-    ends = time[[0, -1]]
-    recorded = recorded_load(
-        trace, load, time, name, "give a window in which the slider is in contact"
-    )
-    if recorded is None:
-        return 1.0, "", False, ends, np.ones(2)
-    t, W = recorded
-    mean = float(W.mean())
-    noise = float(np.median(np.abs(np.diff(W, 2)))) / 0.6745 / np.sqrt(6.0) if W.size > 4 else 0.0
-    knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)
-    if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
-        return mean, unit, False, ends, np.full(2, mean)
-    at = _corner_times(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
-    at = _fitted_corners(t, W, at)
-    values = _line_through(t, W, at)
-    at[0], at[-1] = time[0], time[-1]
-    return float(values[0]), unit, True, at, values
-
-
-def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
-    """Samples at the corners of a piecewise linear load that follows the recorded load.
-
-    Among very many samples, noise alone moves some beyond the limit. Quick changes are therefore
-    detected with a wider limit, and slow changes between them in block means.
-    """
-    if t.size <= LONGEST:
-        knots = _line_knots(t, W, max(_LOAD_NOISE * noise, least))
-        return _needed_knots(t, W, knots, noise, least)
-    chance = -float(ndtri(_LOAD_BY_CHANCE / t.size))
-    knots = _line_knots(t, W, max(2 * chance * noise, least))
-    result = set(knots)
-    for a, b in pairwise(knots):
-        q = max(1, (b - a) // _LOAD_BLOCKS)
-        if q == 1:
-            continue
-        whole = (b - a) // q * q
-        means = [x[a : a + whole].reshape(-1, q).mean(1) for x in (t, W)]
-        limit = max(_LOAD_NOISE * noise / np.sqrt(q), least)
-        result |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
-    return _needed_knots(t, W, sorted(result), noise, least)
-
-
-def _corner_times(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
-    """Times of the corners; a corner between two samples is placed where the lines meet.
-
-    A corner between two samples may appear as two corners at these samples, or at samples further
-    away, because the line follows the load within a tolerance only. Friction responds to the load
-    within a fraction of a sampling interval, so that the exact time matters.
-    """
-    at = t[list(knots)]
-    values = _line_through(t, y, at)
-    slope = np.diff(values) / np.diff(at)
-    size = np.diff(knots)
-    kept = list(at[:1])
-    k = 1
-    while k < at.size:
-        if k + 2 < at.size and size[k] <= min(_CORNERS_MERGE, size[k - 1] - 1, size[k + 1] - 1):
-            before, after = slope[k - 1], slope[k + 1]
-            gap = values[k + 1] - after * at[k + 1] - (values[k] - before * at[k])
-            meeting = gap / (before - after) if before != after else np.nan
-            near = slice(knots[k], knots[k + 1] + 1)
-            line = np.where(
-                t[near] < meeting,
-                values[k] + before * (t[near] - at[k]),
-                values[k + 1] + after * (t[near] - at[k + 1]),
-            )
-            if at[k] < meeting < at[k + 1] and np.abs(line - y[near]).max() <= tolerance:
-                kept.append(meeting)
-                k += 2
-                continue
-        kept.append(at[k])
-        k += 1
-    return np.array(kept)
-
-
-def _fitted_corners(t: Float, y: Float, at: Float) -> Float:
-    """Corners moved by up to an interval, to the best fit of the lines on both sides to y."""
-    placed = at.copy()
-    for k in range(1, at.size - 1):
-        middle = int(np.searchsorted(t, at[k]))
-        first = max(middle - _SAMPLES_NEAR_CORNER, int(np.searchsorted(t, placed[k - 1])))
-        last = min(middle + _SAMPLES_NEAR_CORNER, int(np.searchsorted(t, at[k + 1], side="right")))
-        near, values = t[first:last], y[first:last]
-        if not first + 1 < middle < last - 2:
-            continue
-
-        def squares(corner: float, near: Float = near, values: Float = values) -> float:
-            knots = np.array([near[0], corner, near[-1]])
-            line = np.interp(near, knots, _line_through(near, values, knots))
-            return float(np.sum((line - values) ** 2))
-
-        inside = max(t[middle - 1], near[1]), min(t[middle + 1], near[-2])
-        result = minimize_scalar(squares, bounds=inside, method="bounded")
-        if result.fun < squares(at[k]):
-            placed[k] = result.x
-    return placed
-
-
-def _line_through(t: Float, y: Float, at: Float) -> Float:
-    """Values at the knots of the piecewise linear function that fits y best."""
-    i = np.clip(np.searchsorted(at, t, side="right") - 1, 0, at.size - 2)
-    share = (t - at[i]) / (at[i + 1] - at[i])
-    # Normal equations of the hat functions; each has a sample at its knot or next to it.
-    bands = np.zeros((2, at.size))
-    bands[1] = np.bincount(i, (1 - share) ** 2, at.size) + np.bincount(i + 1, share**2, at.size)
-    bands[0, 1:] = np.bincount(i, share * (1 - share), at.size)[:-1]
-    right = np.bincount(i, (1 - share) * y, at.size) + np.bincount(i + 1, share * y, at.size)
-    return np.asarray(solveh_banded(bands, right))
-
-
-def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
-    """Corners of a polyline through y within a tolerance (Ramer, Douglas, Peucker)."""
-
-    def away(a: int, b: int) -> Float:
-        """Distances from the chord."""
-        chord = y[a] + (y[b] - y[a]) * (t[a : b + 1] - t[a]) / max(t[b] - t[a], 1e-300)
-        return np.abs(y[a : b + 1] - chord)
-
-    kept = {0, t.size - 1}
-    parts = [(0, t.size - 1)]
-    while parts:
-        a, b = parts.pop()
-        if b - a < 2:
-            continue
-        apart = away(a, b)
-        k = int(np.argmax(apart))
-        if apart[k] > tolerance:
-            kept.add(a + k)
-            parts += [(a, a + k), (a + k, b)]
-    return sorted(kept)
-
-
-def _needed_knots(
-    t: Float, y: Float, knots: Sequence[int], noise: float, least: float
-) -> list[int]:
-    """Knots that are needed: without them, the best piecewise linear fit to y is too poor.
-
-    The corners come from chords through noisy samples, and some of them are no corners of the load.
-    Without a corner, the line between its neighbours has a larger sum of squares; the increase is
-    compared with the penalty of the Bayesian information criterion for a corner's time and value.
-    """
-    at = np.asarray(knots)
-    span = float(t[-1] - t[0])
-    x, v = (t - t[0]) / span, y - y.mean()
-    columns = np.stack([np.ones_like(x), x, x * x, v, x * v])
-    sums = np.pad(np.cumsum(columns, axis=1), ((0, 0), (1, 0)))
-    penalty = 2 * np.log(t.size)
-    while at.size > 2:
-        a, k, b = at[:-2], at[1:-1], at[2:]
-        n, x1, x2, v1, xv = sums[:, b + 1] - sums[:, a]
-        m, h1, h2, hv1, hxv = sums[:, b + 1] - sums[:, k]
-        here = x[k]
-        # The hinge function (x - here)+ less its best linear fit.
-        h, hx = h1 - here * m, h2 - here * h1
-        hh, hv = hx - here * h, hxv - here * hv1
-        spread = x2 - x1 * x1 / n
-        slope = (hx - x1 * h / n) / spread
-        size = hh - h * h / n - slope * (hx - x1 * h / n)
-        bend = (hv - h * v1 / n - slope * (xv - x1 * v1 / n)) / np.maximum(size, 1e-300)
-        gain = bend * bend * size
-        high = np.abs(bend) * (here - x[a]) * (x[b] - here) / (x[b] - x[a])
-        worth = np.minimum(gain / (penalty * noise**2), high / least) if noise else high / least
-        # Among neighbours that are not needed, the less needed corner is removed first.
-        lower = np.concatenate([[np.inf], worth, [np.inf]])
-        gone = (worth < 1) & (worth <= lower[:-2]) & (worth < lower[2:])
-        if not gone.any():
-            break
-        at = np.delete(at, 1 + np.flatnonzero(gone))
-    return at.tolist()
-
-
-def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
-    """Times of velocity changes; those within a sampling interval of a load corner move to it.
-
-    The drive then changes velocity and load at once. The time of a corner is known to a fraction of
-    the interval, that of a velocity change is not; a short piece between them would leave no room
-    for the delay of the change.
-    """
-    moved = []
-    for cut in cut_times:
-        k = int(np.clip(np.searchsorted(times, cut), 1, times.size - 1))
-        corner = float(knots[np.argmin(np.abs(knots - cut))])
-        close = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
-        moved.append(corner if close else cut)
-    return sorted(set(moved)) if len(set(moved)) == len(moved) else list(cut_times)
-
-
-def _drive(
-    times: Float, cut_times: Sequence[float], speeds: Sequence[float], knots: Float, load: Float
-) -> tuple[Drive, list[int]]:
-    """The drive, and the indices of its edges at which the velocity changes."""
-    edges = np.unique(np.concatenate([[0.0, times[-1]], cut_times, knots]))
-    middle = (edges[1:] + edges[:-1]) / 2
-    piece = np.searchsorted(np.asarray(cut_times), middle)
-    pull = np.asarray(speeds)[piece] / speeds[0]
-    at_edges = np.interp(edges, knots, load)
-    slope = np.diff(at_edges) / np.diff(edges)
-    cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
-    return Drive(edges, pull, at_edges[:-1], slope), cuts

@@ -14,7 +14,8 @@ import numpy as np
 
 from asperity.arrays import Bool, Float
 from asperity.errors import InputError, require
-from asperity.inference.runs.run import STIFFNESS, recorded_load
+from asperity.inference.runs.recorded_drive import recorded_load
+from asperity.inference.runs.run import STIFFNESS
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
