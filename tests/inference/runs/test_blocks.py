@@ -10,7 +10,7 @@ from scipy.signal import lfilter, lsim
 from asperity.errors import InputError
 from asperity.inference import RunOptions, fit, recorded_run
 from asperity.inference.runs.blocks import averaged, reduced
-from asperity.inference.runs.cleaning import cleaned
+from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import get_law
 from asperity.recording import Trace
@@ -140,6 +140,15 @@ def test_spikes_are_left_out_of_the_means(clean, ringing):
     clean_run, run = (cleaned(recorded(x), 100.0) for x in (clean + ringing, spoiled))
     assert len(run.spikes) == 3
     np.testing.assert_allclose(run.friction, clean_run.friction, atol=3 * NOISE / 24)
+
+
+def test_spikes_of_a_thousandth_of_the_samples_are_no_wrong_means(clean, ringing):
+    """20 spikes of 24,000 samples, which are 2 in a hundred of the means."""
+    spoiled = clean + ringing
+    spoiled[600::1200] += 0.1
+    run = cleaned(recorded(spoiled), 100.0)
+    assert len(run.spikes) == 20
+    assert with_wrong_samples(run, ()).doubts == run.doubts
 
 
 def test_a_wrong_mean_is_left_out_of_wider_blocks_too(clean, ringing):

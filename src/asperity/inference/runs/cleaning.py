@@ -81,8 +81,10 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
 
 
 def most_wrong(run: RecordedRun) -> int:
-    """Largest number of samples, in addition to the spikes, that a fit may leave out."""
-    return min(int(1 + _MOST_SPIKES * run.time.size) - len(run.spikes or ()), _MOST_WRONG)
+    """Largest number of samples, in addition to the spikes, or of means, that a fit leaves out."""
+    # The means of a long recording are taken without its spikes.
+    spikes = len(run.spikes or ()) if run.blocks is None else 0
+    return min(int(1 + _MOST_SPIKES * run.time.size) - spikes, _MOST_WRONG)
 
 
 def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
