@@ -1,5 +1,6 @@
 """Fits of recordings by SciPy with noise, and of real ones: values, intervals, warnings, input."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -551,6 +552,21 @@ def test_numbers_in_columns_of_a_table_are_those_of_the_recordings_too(steps_fit
         else:
             (term,) = objective_of(law, data, FREE, given, motion=motion).terms_of(RunTerm)
             assert (term.fixed["V0"], term.fixed["M"]) == (2e-6, 0.3)
+
+
+def test_a_free_load_of_a_table_is_not_that_of_a_recording(steps_fit):
+    """The stiffness of the recording is over its measured load."""
+    run = replace(steps_fit.objective.terms[0].run, load_unit="N", W0=1000.0)
+    given = Given({"mu0": 0.6, "V0": 1e-6}, None, None, {"W0": 7.0})
+    free = [*FREE, "W0"]
+    objective = objective_of(get_law("rice-ruina"), [readings(), run], free, given)
+    (term,) = objective.terms_of(RunTerm)
+    known = steps_fit.values
+    values = {k.name: known.get(k.name.partition("[")[0], k.middle) for k in objective.unknowns}
+    values[f"K[{run.name}]"] *= 1000.0 / steps_fit.objective.terms[0].run.W0
+    one, other = term.chi2_of_many([values, values | {"W0": 14.0}])
+    assert math.isfinite(one)
+    assert one == other
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,8 @@ class RunTerm(DataTerm):
         radiation_damping: bool = False,
     ) -> None:
         self.run, self.law, self.name = run, law, run.name
-        self._known = {*law_parameters(law), "K", "W0", "M", "eps_ratio"}
+        # The load of a recording is measured: a free or fixed W0 is that of a table.
+        self._known = {*law_parameters(law), "K", "M", "eps_ratio"}
         self._known |= {"eta"} if radiation_damping else set()
         self.fixed = {n: v for n, v in fixed.items() if n in self._known} | {"W0": run.W0}
         self.options, self.nuisances = options, nuisances
