@@ -25,7 +25,7 @@ from asperity.inference.fitting.plausibility import (
 from asperity.inference.fitting.result import Optimum, fit_record
 from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
-from asperity.inference.runs.cleaning import cleaned, without_spikes
+from asperity.inference.runs.cleaning import cleaned, with_wrong_samples, without_spikes
 from asperity.inference.runs.levels import level_change, level_rates
 from asperity.inference.runs.noise import largest_departure
 from asperity.inference.runs.term import RunTerm
@@ -723,6 +723,9 @@ def test_given_jumps_and_spikes_replace_the_detected_ones():
     named = recorded_run(trace, steps=[45.0], velocities=[3e-6, 1e-5], spikes=[35.01], jumps=[95.0])
     assert named.spikes == pytest.approx((30.0,))
     assert named.jumps == pytest.approx((90.0,))
+    # The user may name more spikes than the search would take for spikes.
+    many = replace(run, spikes=tuple(run.time[1:-1:10]))
+    assert with_wrong_samples(many, ()).doubts == run.doubts
     with pytest.raises(InputError, match=r"jumps must lie inside the recording, got 500 s"):
         recorded_run(trace, steps=[45.0], velocities=[3e-6, 1e-5], jumps=[500.0])
 

@@ -84,7 +84,7 @@ def most_wrong(run: RecordedRun) -> int:
     """Largest number of samples, in addition to the spikes, or of means, that a fit leaves out."""
     # The means of a long recording are taken without its spikes.
     spikes = len(run.spikes or ()) if run.blocks is None else 0
-    return min(int(1 + _MOST_SPIKES * run.time.size) - spikes, _MOST_WRONG)
+    return min(max(int(1 + _MOST_SPIKES * run.time.size) - spikes, 0), _MOST_WRONG)
 
 
 def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
