@@ -347,7 +347,6 @@ def answer_comparison(
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
     """Data of a fit; files and recordings are read or converted."""
     several = data if isinstance(data, list | tuple) else [data]
-    require(several, "data", "hold readings or a recording", "none", "give a table or a recording")
     fixed = of_type(fixed, Mapping[str, Any] | None, "fixed")
     loaded: list[Any] = []
     for one in several:

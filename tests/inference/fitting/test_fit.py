@@ -318,6 +318,8 @@ def test_readings_that_differ_are_joined(columns):
         ({"free": ("A",), "fixed": {"sigma_n": 1.0}}, "got 'sigma_n'; did you mean 'W0'?"),
         ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),
         ({"free": ("tilt",)}, "must be parameters of elasto-plastic, got 'tilt'"),
+        # A gauge of recordings alone has a gain.
+        ({"free": ("A", "gain")}, "must be parameters of elasto-plastic, got 'gain'"),
         ({"free": ("A",), "start": {"B": 0.1}}, "start must be of free parameters"),
         ({"free": ("A",), "fixed": {"eps_ratio": 3.0}}, "must be below 1"),
     ],
@@ -326,6 +328,11 @@ def test_bad_options_are_refused(readings, pmma, options, message):
     with pytest.raises(InputError) as caught:
         fit(readings(None), "elasto-plastic", material=pmma, **options)
     assert message in str(caught.value)
+
+
+def test_a_fit_without_data_is_refused():
+    with pytest.raises(InputError, match="data must hold readings or a recording, got none"):
+        fit([], "rice-ruina", ["A"])
 
 
 def test_a_stiffness_over_the_load_is_converted_to_N_per_m(readings, pmma):

@@ -85,6 +85,7 @@ class Given(NamedTuple):
 def listed_data(data: Data | Iterable[Data], options: RunOptions) -> list[Measured]:
     """Data as a list, with recordings as `RecordedRun`."""
     several = [data] if isinstance(data, Measured | Trace) else list(data)
+    require(several, "data", "hold readings or a recording", "none", "give a table or a recording")
     ready = [d if isinstance(d, Measured) else recorded_run(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
@@ -237,46 +238,34 @@ def _of_readings(
 ) -> Objective:
     """The function to minimise for a table, recordings, or both."""
     fixed, material = given.fixed, given.material
+    alone = table is None
     require_motion(free, motion)
     require_motion(fixed, motion, label="fixed")
+    # The stiffness of a recording is free, shared by all data if it is named.
+    shared = "K" in free
+    priors = given.priors(free)
+    mu0_given = not alone or "mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
+    assumed = {}
     if recordings:
         require_no_layer(free)
-    if recordings and table is None:
+    if alone:
         require_seen(recordings, free)
         if not any(run.load_varies for run in recordings):
             counted = ("M", "eta", *motion)
             require_counted(fixed, motion, counted, "a recording of a constant load")
-    # The stiffness of a recording is free, shared by all data if it is named.
-    shared = "K" in free
-    if table is not None and (shared or "K" in fixed):
+        assumed = _reference_of(recordings[0], fixed, mu0_given=mu0_given)
+    elif shared or "K" in fixed:
         require_newtons(recordings)
-    named = [name for name in free if not (name == "K" and recordings and table is None)]
-    priors = given.priors(free)
-    mu0_given = "mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
-    assumed = {}
-    if recordings and table is None:
-        first = recordings[0]
-        rule, got = f"come with {symbol('mu0')}", "it alone: the friction at the first velocity"
-        advice = f"free {symbol('mu0')}, which is then that at {symbol('V0')}, or leave it out"
-        require(mu0_given or "V0" not in fixed, Argument("fixed", "V0"), rule, got, advice)
-        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
-    constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
+    # The gain of a gauge is a nuisance of recordings: its prior makes it free.
+    of_law = [n for n in free if not (recordings and n.partition("[")[0] == GAIN)]
+    constants = fixed_values(law, table, of_law, fixed, material, assumed=assumed)
     require_masses(free, constants, motion)
     begun = start_values(law, free, given.start, material, runs=recordings)
-    if table is not None and shared:
+    if shared and not alone:
         loads = [*np.ravel(constants.get("W0", math.nan)), *(run.W0 for run in recordings)]
         begun, priors = stiffness_of_table(begun, priors, loads)
     if recordings:
-        require_calibrated(
-            recordings,
-            free,
-            priors,
-            mu0_given=mu0_given or table is not None,
-            with_table=table is not None,
-        )
-        # Its prior makes it free.
-        named = [name for name in named if name.partition("[")[0] != GAIN]
-    largest = 0.0 if table is None else float(table.points["epsilon"].max())
+        require_calibrated(recordings, free, priors, mu0_given=mu0_given, with_table=not alone)
     usual = usual_ranges(recordings) if recordings else {}
     if "W0" in constants and "K" not in (*begun, *priors):
         W0 = float(np.median(constants["W0"]))
@@ -284,8 +273,8 @@ def _of_readings(
     unknowns = list(
         unknowns_of(
             law,
-            named,
-            largest_epsilon=largest,
+            [n for n in of_law if not (alone and n == "K")],
+            largest_epsilon=0.0 if table is None else float(table.points["epsilon"].max()),
             start=begun,
             priors=priors,
             usual=usual,
@@ -296,16 +285,16 @@ def _of_readings(
         count = sum(int(np.isfinite(v).sum()) for v in table.values.values())
         require_enough(table.name, count, unknowns)
         terms.append(LockInTerm(table, law, constants, **motion))
+    elif shared:
+        unknowns.append(shared_stiffness(recordings, begun, priors))
     if recordings:
-        if shared and table is None:
-            unknowns.append(shared_stiffness(recordings, begun, priors))
-        if "mu0" in free and table is None:
+        if "mu0" in free and alone:
             options = replace(options, linear=tuple(n for n in options.linear if n != "offset"))
         terms_of_runs, nuisances = run_terms(
             recordings,
             law,
             _of_recordings(law, constants, motion),
-            with_table=table is not None,
+            with_table=not alone,
             shared_stiffness=shared,
             fixed_stiffness=fixed.get("K"),
             start=begun,
@@ -321,6 +310,22 @@ def _of_readings(
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )
+
+
+def _reference_of(
+    run: RecordedRun, fixed: Mapping[str, Any], *, mu0_given: bool
+) -> dict[str, float]:
+    """V0 and mu0 of recordings, if they are not given: the first velocity, and friction there.
+
+    Raises
+    ------
+    InputError
+        If V0 is fixed without mu0.
+    """
+    rule, got = f"come with {symbol('mu0')}", "it alone: the friction at the first velocity"
+    advice = f"free {symbol('mu0')}, which is then that at {symbol('V0')}, or leave it out"
+    require(mu0_given or "V0" not in fixed, Argument("fixed", "V0"), rule, got, advice)
+    return {"V0": run.velocity, "mu0": float(np.median(run.friction[:16]))}
 
 
 def _of_recordings(

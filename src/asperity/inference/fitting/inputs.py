@@ -133,8 +133,7 @@ def fixed_values(
     InputError
         If a name or value is wrong, or a number is missing.
     """
-    # The prior of a gain makes it free; `require_calibrated` checks the prior.
-    require_fittable(law, [n for n in free if n.partition("[")[0] != GAIN])
+    require_fittable(law, free)
     known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
     points: Mapping[str, Any] = {} if table is None else table.points
     if table is None:

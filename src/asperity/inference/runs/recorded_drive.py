@@ -40,7 +40,7 @@ _CORNERS_MERGE = 5
 #: Number of samples on each side of a corner from which its time is computed.
 _SAMPLES_NEAR_CORNER = 50
 #: For recordings of more samples than the first number: number of blocks over which the load
-#: between its quick changes is averaged, and probability that noise moves a sample beyond the limit.
+#: between its quick changes is averaged; probability that noise moves a sample beyond the limit.
 _FEW_SAMPLES, _LOAD_BLOCKS, _LOAD_BY_CHANCE = 20_000, 4_000, 1e-3
 
 
