@@ -134,42 +134,36 @@ def fixed_values(
         If a name or value is wrong, or a number is missing.
     """
     require_fittable(law, free)
-    known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
     points: Mapping[str, Any] = {} if table is None else table.points
-    if table is None:
-        known = {
-            n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
-        }
+    of_points = ("V", "epsilon", "frequency", "K", "W0") if table is None else ()
+    absent = (*MODULATION, *of_points)
+    known = {n: p for n, p in point_parameters(law).items() if n not in absent}
+    # The K of a recording is fixed with its load.
+    given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
+    _require_fixable(law, given, free, known)
     elsewhere = {n: p.default for n, p in known.items() if p.default is not None}
     elsewhere |= {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
     elsewhere |= {**(assumed or {}), **material_values(material, known)}
-    given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
-    for name in given:
-        require(name not in free, symbol(name), "be free or fixed", "both", "leave one out")
-        rule, advice = "be parameters of a harmonic load", "leave it out: fits take no other load"
-        require(name not in MODULATION, "fixed", rule, f"'{symbol(name)}'", advice)
-        if name not in known and name != "eps_ratio":
-            rule = f"be parameters of {law.name}"
-            advice = suggestion(name, known, "leave it out or choose another law")
-            raise InputError("fixed", rule, f"'{symbol(name)}'", advice)
+    over = over_load(given.get("K"))
     result: dict[str, Any] = {}
     missing = []
     for name in known:
         if name in free or name == "inertia":
             continue
         column = points.get(name, np.nan)
-        if name in given:
-            over = over_load(given[name]) if name == "K" else None
-            result[name] = _checked(law, "fixed", name, given[name]) if over is None else over
-        elif np.isfinite(column).all():
+        recorded = np.isfinite(column)
+        if name == "K" and over is not None:
+            result[name] = over
+        elif name in given:
+            result[name] = _checked(law, "fixed", name, given[name])
+        elif recorded.all():
             result[name] = column
         elif name not in elsewhere:
             missing.append(name)
-        elif np.isfinite(column).any():
-            # One of several tables has this column.
-            result[name] = np.where(np.isfinite(column), column, elsewhere[name])
         else:
-            result[name] = elsewhere[name]
+            # One of several tables may have this column.
+            some = recorded.any()
+            result[name] = np.where(recorded, column, elsewhere[name]) if some else elsewhere[name]
     if missing:
         raise UnfittableLawError(
             law.name,
@@ -178,7 +172,7 @@ def fixed_values(
             f"use {Argument('free')} or {Argument('fixed', missing[0])}, add columns, or name a "
             "material",
         )
-    if over_load(given.get("K")) is not None:
+    if over is not None:
         if "W0" not in result:
             K, W0 = symbol("K"), symbol("W0")
             rule, got = f"come with a fixed {W0}", f"'{given['K']}' and {W0} free"
@@ -196,6 +190,28 @@ def fixed_values(
         advice = "contact would be lost"
         require(not largest >= 1, "eps_ratio times epsilon", "be below 1", f"{largest:g}", advice)
     return result
+
+
+def _require_fixable(
+    law: type[Law],
+    given: Mapping[str, Any],
+    free: Sequence[str],
+    known: Mapping[str, Parameter],
+) -> None:
+    """Refuse fixed parameters that are free, or that the law and its data do not have.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in given:
+        require(name not in free, symbol(name), "be free or fixed", "both", "leave one out")
+        rule, advice = "be parameters of a harmonic load", "leave it out: fits take no other load"
+        require(name not in MODULATION, "fixed", rule, f"'{symbol(name)}'", advice)
+        if name not in known and name != "eps_ratio":
+            rule = f"be parameters of {law.name}"
+            advice = suggestion(name, known, "leave it out or choose another law")
+            raise InputError("fixed", rule, f"'{symbol(name)}'", advice)
 
 
 def require_agreement(parameter: Parameter, fixed: Any, column: Any) -> None:
