@@ -147,7 +147,9 @@ def test_public_functions_are_checked(call, name) -> None:
         call()
 
 
-TRACE = asp.samples.modulated()
+TIME = np.arange(64) / 64.0
+FORCE = asp.recording.Channel(3 + np.cos(9 * TIME), "force", "N")
+TRACE = asp.recording.Trace(TIME, {"F": FORCE, "W": FORCE})
 RECORDER = asp.tribometer.Recorder(rate=9.0)
 PROGRAMME = Programme(Slide("1 s"), load=7.0, velocity=1e-6)
 PRINTED = {"dimension": "length", "kind": "fitted", "place": "Fig. 1"}
