@@ -29,6 +29,9 @@ if _ONE_MODULE not in os.environ.get("XLA_FLAGS", ""):
 # process. NumPy reads this variable when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# Tests of stores and files wait for the disk a third of their time, and none cuts the power.
+os.fsync = lambda descriptor: None
+
 #: Rooms that take longest from an empty compilation cache; they run first.
 LONGEST = (
     *("orbit", "inference", "papers", "branches", "docs", "transients", "study", "app"),
