@@ -19,18 +19,18 @@ pytest_plugins = [
 ]
 
 # XLA splits a program into up to 32 modules to compile them on several cores. Here other tests use
-# the other cores, and a single module takes a sixth less processor time. JAX reads this option when
-# it first looks for devices.
+# the other cores, and a single module takes a sixth less processor time.
 _ONE_MODULE = "--xla_cpu_parallel_codegen_split_count=1"
-if _ONE_MODULE not in os.environ.get("XLA_FLAGS", ""):
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_ONE_MODULE}".strip()
+# The generator of code that `asperity._jax.jit_large` takes compiles a single operation, of which
+# tests run a thousand different ones, in half the time. The long tests take XLA's own choice.
+_OLDER_GENERATOR = "--xla_cpu_use_fusion_emitters=false"
+
+# Tests of stores and files wait for the disk a third of their time, and none cuts the power.
+os.fsync = lambda descriptor: None
 
 # The threads of a BLAS wait for each other in loops, which takes processor time from the other
 # process. NumPy reads this variable when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-# Tests of stores and files wait for the disk a third of their time, and none cuts the power.
-os.fsync = lambda descriptor: None
 
 #: Rooms that take longest from an empty compilation cache; they run first.
 LONGEST = (
@@ -58,6 +58,13 @@ _SWITCH = "jax_disable_most_optimizations"
 #: Fixtures that take seconds: whole figures, claims and experiments of a paper. Tests with them are
 #: not for `make quick`.
 SLOW_FIXTURES = {"figures", "claims", "experiment"}
+
+
+def pytest_configure(config):
+    """Say how XLA compiles: JAX reads this when it first looks for devices."""
+    flags = os.environ.get("XLA_FLAGS", "").split()
+    flags += [_ONE_MODULE, *([] if config.option.markexpr == "long" else [_OLDER_GENERATOR])]
+    os.environ["XLA_FLAGS"] = " ".join(dict.fromkeys(flags))
 
 
 def is_short(item):
