@@ -51,7 +51,8 @@ BRIEF = (
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
     *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
     *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
-    *("inference/fitting/test_fit.py", "inference/runs/test_motion.py"),
+    *("inference/fitting/test_fit.py", "inference/fitting/test_parabola.py"),
+    *("inference/runs/test_motion.py", "inference/runs/test_with_readings.py"),
 )
 _SWITCH = "jax_disable_most_optimizations"
 
