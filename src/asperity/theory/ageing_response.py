@@ -24,8 +24,10 @@ none: <p> = 1 and <e^(-phi)> = 1 hold exactly, so
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -85,7 +87,12 @@ def ageing_response(p: SmallModulation, age_velocity: AgeVelocity = "slider") ->
     InputError
         If `age_velocity` is neither of the two.
     """
-    plastic = age_velocity == "plastic"
+    return _response(p, age_velocity == "plastic")
+
+
+# As one program: compiling each operation takes ten times as long.
+@partial(jax.jit, static_argnames="plastic")
+def _response(p: SmallModulation, plastic: bool) -> AgeingResponse:
     one, two = _order(p, 1, plastic), _order(p, 2, plastic)
     nu = p.V / (p.omega * p.D0)
 
