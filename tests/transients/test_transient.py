@@ -243,7 +243,7 @@ def test_a_law_without_states_follows_the_drive_as_a_logistic_function() -> None
 def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
     law = asp.laws.Regularised(**COMMON)
     slider = asp.Slider(law, spring=4e5, load=7.0)
-    programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
+    programme = Programme(Slide("1 s"), Slide("6 s", "-10 um/s"), **START)
     motion = transient(slider, programme, sampling="20 Hz")
 
     def rates(t: float, y: np.ndarray) -> list[float]:
@@ -253,7 +253,7 @@ def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
         return [4e5 * (-1e-5 - v), np.exp(-log_age) - abs(v) / 4e-7]
 
     start = [motion.force[20], np.log(0.4)]
-    true = solve_ivp(rates, (0, 10), start, "LSODA", motion.time[20:] - 1, rtol=1e-11, atol=1e-11)
+    true = solve_ivp(rates, (0, 6), start, "LSODA", motion.time[20:] - 1, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(motion.force[20:], true.y[0], rtol=0, atol=7e-8)
     (reversal,) = motion.event_times("reversal")
     np.testing.assert_allclose(np.interp(reversal, motion.time, motion.force), 0, atol=0.05)
@@ -289,9 +289,7 @@ def test_the_dataset_has_units_events_and_provenance(physical) -> None:
 
 @pytest.mark.parametrize(
     ("name", "times"),
-    population(
-        [("rice-ruina", 1), ("perrin-rice-zheng", 2), ("ruina-slip", 1)], short=2, several=True
-    ),
+    population([("perrin-rice-zheng", 2), ("rice-ruina", 1), ("ruina-slip", 1)], several=True),
 )
 def test_the_age_of_steady_sliding_is_that_of_the_law(name, times) -> None:
     law = asp.laws.get_law(name)(mu0=0.6, A=0.012, B=0.01, D0="1 um", V0="3 um/s")
