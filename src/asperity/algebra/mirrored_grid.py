@@ -41,8 +41,14 @@ def antiderivative(integral: Any, rate: Any) -> Any:
 
 
 def interpolation(phases: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Matrix of trigonometric interpolation from even nodes to phases, (phases, nodes)."""
+    """Matrix of trigonometric interpolation from even nodes to phases, (phases, nodes).
+
+    Its elements are (1 + 2 cos x + ... + 2 cos m x)/nodes = sin((m + 1/2) x)/sin(x/2)/nodes at the
+    distance x, which is within half a turn: next to a full turn the quotient would be round-off.
+    """
     count = len(nodes)
-    k = np.arange(1, (count + 1) // 2)[:, None, None]
-    kernel: np.ndarray = (1 + 2 * np.cos(k * (phases[:, None] - nodes)).sum(0)) / count
+    x = np.remainder(phases[:, None] - nodes + np.pi, 2 * np.pi) - np.pi
+    terms = 2 * ((count + 1) // 2) - 1
+    with np.errstate(invalid="ignore"):
+        kernel: np.ndarray = np.where(x == 0, terms, np.sin(terms * x / 2) / np.sin(x / 2)) / count
     return kernel
