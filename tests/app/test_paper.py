@@ -7,6 +7,7 @@ import pytest
 
 import asperity as asp
 from asperity.app.api import paper
+from asperity_papers.bureau2000 import tab
 
 
 @pytest.fixture
@@ -86,6 +87,22 @@ def test_curves_with_the_mass_follow_the_numbers():
         slider, velocity="1 um/s", epsilon=epsilon, frequency="120 Hz", inertia=True
     )
     assert curve["values"]["mu2"][20:] == pytest.approx(point.mu2, rel=1e-6)
+
+
+def test_a_gap_of_a_curve_says_why(figure, monkeypatch, visit):
+    figure(figure="figure-08")  # the lines with the printed numbers are kept
+    whole = tab.solve_curves
+
+    def with_a_gap(*arguments, **options):
+        rows = whole(*arguments, **options)
+        rows.loc[3:4, "converged"], rows.loc[3:4, "result"] = False, "no orbit there"
+        return rows
+
+    monkeypatch.setattr(tab, "solve_curves", with_a_gap)
+    page = visit("#paper?figure=figure-08&K=300000")
+    reasons = page.locator(".key .lost")
+    reasons.first.wait_for()
+    assert reasons.all_text_contents() == [" – no orbit at 2 of 26 points: no orbit there"] * 2
 
 
 def test_an_unknown_paper_is_told_in_a_sentence(visit):

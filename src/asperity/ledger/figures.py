@@ -333,7 +333,8 @@ class Section:
     after: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
 
 
-#: A line of a figure: ``name``, and ``values``, columns by their names.
+#: A line of a figure: ``name``; ``values``, columns by their names; ``lost``, why points are
+#: missing, if there are such.
 Line: TypeAlias = dict[str, Any]
 #: What a text states at one abscissa: ``x``, ``ends``, one number or two, and ``text``.
 Mark: TypeAlias = dict[str, Any]

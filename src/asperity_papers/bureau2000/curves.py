@@ -26,7 +26,7 @@ WORDS = figure_words(PAPER.package)
 
 _SOLVED = (
     "mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", "floquet_max", "stable",
-    "converged",
+    "converged", "result",
 )  # fmt: skip
 APPLIED, BORNE = "epsilon_applied", "epsilon_eff"
 
@@ -82,8 +82,8 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
     Returns
     -------
     DataFrame
-        With the columns ``column`` of figures.toml. A point that failed has ``converged`` False
-        and NaN.
+        With the columns ``column`` of figures.toml. A point that failed has ``converged`` False,
+        NaN, and the reason in ``result``.
     """
     return pd.concat([_solve(machine, curve, options) for curve in curves], ignore_index=True)
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from asperity import periodic_response
+from asperity import InputError, periodic_response
 from asperity.ledger import FigureNumbers
 from asperity.orbit import over_a_period
 from asperity_papers.bureau2000.curves import CurveFigure, FigureCurve, figure_numbers
@@ -57,11 +57,19 @@ def one_period(
     -------
     DataFrame
         With the columns of figure 13 but "curve".
+
+    Raises
+    ------
+    InputError
+        If there is no periodic orbit.
     """
     response = periodic_response(
         machine.slider(law), velocity=V, epsilon=epsilon, frequency=machine.numbers.frequency,
         inertia=inertia, waveform=samples,
     )  # fmt: skip
+    if not response.converged:
+        rule = f"have a periodic orbit of {law} at {1e6 * V:g} um/s"
+        raise InputError("the motion", rule, str(response.result), "change the numbers")
     return pd.DataFrame({"law": law, "inertia": inertia, **over_a_period(response)._asdict()})
 
 

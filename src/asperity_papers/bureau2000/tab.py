@@ -48,9 +48,11 @@ def _line(figure: str, machine: Machine, curve: FigureCurve, **options: Any) -> 
         raise InputError("the amplitude on the contacts", "be below 1", got, advice)
     rows = solve_curves(machine, [curve], **options)
     columns = (FIGURES[figure].x, *FIGURES[figure].rows)
+    failed = rows["result"][~rows["converged"].astype(bool)]
     return {
         "name": curve.name.replace("um", "µm").replace("inertia", "with its mass"),
         "values": {name: rows[name].to_numpy(float) for name in columns},
+        "lost": f"{len(failed)} of {len(rows)} points: {failed.iloc[0]}" if len(failed) else "",
     }
 
 

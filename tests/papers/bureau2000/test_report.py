@@ -29,7 +29,7 @@ FIGURES = ["figure-01", *DRAWN, "figure-10"]
 COLUMNS = [
     *("curve", "law", "alpha", "lambda", "inertia", "damping", "V", "frequency"),
     *("epsilon_applied", "epsilon_eff", "mean_friction", "delta_mu", "mu1", "mu2", "phase1"),
-    *("phase2", "floquet_max", "stable", "converged"),
+    *("phase2", "floquet_max", "stable", "converged", "result"),
 ]
 VIRTUAL = [f"virtual-{n:02}" for n in (2, 3, 4, 5)]
 

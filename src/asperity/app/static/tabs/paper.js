@@ -162,11 +162,16 @@ export function create(page) {
       `${asSentence()} Curves: ${moved.map((c) => c.name).join(", ")}.`);
     const hasStated = rows.some((row) => stated[row.column]);
     fill(figure.note,
-      moved.map((curve, k) => key(series(k), curve.name)),
-      inertia.map(({ curve }, k) => key(massClass(curve, k), curve.name)),
-      isMoved && key("printed dashed", "as printed"),
+      moved.map((curve, k) => key(series(k), curve.name, gaps(curve))),
+      inertia.map(({ curve }, k) => key(massClass(curve, k), curve.name, gaps(curve))),
+      isMoved && key("printed dashed", "as printed", ...printed.map(gaps)),
       hasStated && key("point stated", "stated in the text"));
     drawEnds();
+  }
+
+  /** Why a curve has gaps; nothing of a whole one. */
+  function gaps(curve) {
+    return curve.lost ? el("span", { class: "lost" }, ` – no orbit at ${curve.lost}`) : "";
   }
 
   /** The colour of the same curve without the mass, and a pattern that grey print keeps apart. */
