@@ -1,6 +1,5 @@
 """Fits of recordings by SciPy with noise, and of real ones: values, intervals, warnings, input."""
 
-import math
 import re
 from dataclasses import replace
 from pathlib import Path
