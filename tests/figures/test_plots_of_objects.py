@@ -45,6 +45,7 @@ def test_points_in_any_order_are_drawn_from_left_to_right_and_one_that_failed_is
     assert curve.get_xdata().tolist() == [0.01, 0.1, 0.24, 0.9999]
     np.testing.assert_array_equal(curve.get_ydata(), response.mu1[[3, 1, 0, 2]])
     assert unstable.get_xdata().tolist() == [0.01, 0.1]
+    assert "1 of 4 points have no value: not searched: epsilon" in figure.get_suptitle()
     assert [axis.get_xlabel() for axis in figure.axes] == ["", "", ""]
     assert figure.get_supxlabel().startswith("relative amplitude of the load")
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from asperity.arrays import Float
-from asperity.figures.style import new_figure
+from asperity.figures.style import new_figure, reason_of_gaps
 from asperity.parameters.arguments import typed
 from asperity.study.map.dataset import critical_line
 from asperity.study.points import known_quantities
@@ -51,6 +51,8 @@ _DECADES = 50.0
 _FEW_DECADES = 30.0
 #: Quantiles at the ends of the colour scale, so that few extreme points do not determine it.
 _SPAN = (0.02, 0.98)
+#: Characters of a line above the plane.
+_CHARACTERS = 76
 #: Smallest region, in parts of the shorter side, that has room for its name.
 _ROOM = 0.075
 
@@ -76,6 +78,10 @@ def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
         columns = 2 if len(handles) != 3 else 3
         close = {"handlelength": 2.4, "columnspacing": 1.2}
         figure.legend(handles=handles, loc="outside lower center", ncols=columns, **close)
+    failed = ~dataset["converged"].values
+    if failed.any():
+        text = reason_of_gaps(failed, dataset["result"].values, _CHARACTERS)
+        figure.suptitle(text, fontsize="small")
     return figure
 
 

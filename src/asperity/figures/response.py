@@ -11,7 +11,13 @@ from matplotlib.figure import Figure
 
 from asperity.errors import require
 from asperity.figures.map import axis_unit, label
-from asperity.figures.style import ELASTO_PLASTIC, GREY, RICE_RUINA, new_figure
+from asperity.figures.style import (
+    ELASTO_PLASTIC,
+    GREY,
+    RICE_RUINA,
+    new_figure,
+    reason_of_gaps,
+)
 from asperity.units import format_si
 
 if TYPE_CHECKING:
@@ -44,8 +50,8 @@ def draw_response(response: PeriodicResponse) -> Figure:
     Parameters
     ----------
     response : PeriodicResponse
-        Response of one point, or with one or two axes. A point that failed leaves a gap, an
-        unstable orbit has an open mark.
+        Response of one point, or with one or two axes. A point that failed leaves a gap, of
+        which the title has the reason; an unstable orbit has an open mark.
 
     Raises
     ------
@@ -66,7 +72,8 @@ def draw_stick_slip_response(response: StickSlip) -> Figure:
     Parameters
     ----------
     response : StickSlip
-        Response of one point, or with one or two axes. A point without stick-slip leaves a gap.
+        Response of one point, or with one or two axes. A point without stick-slip leaves a gap,
+        of which the title has the reason.
 
     Raises
     ------
@@ -196,7 +203,8 @@ def _curves(
     if opened.any():
         panels[2].plot([], [], "o", color=GREY, fillstyle="none", markersize=3, label="unstable")
         panels[2].legend(handles=panels[2].get_lines()[-1:], fontsize="small")
-    figure.suptitle(law, fontsize="small")
+    gaps = reason_of_gaps(~np.isfinite(rows[shown[0][0]].values), rows["result"].values, _LINE)
+    figure.suptitle(f"{law}\n{gaps}".rstrip(), fontsize="small")
     # A label below each panel is wider than the panel.
     name = along if side is None else label(side, unit)
     figure.supxlabel(name, fontsize=rcParams["axes.labelsize"])

@@ -13,12 +13,16 @@ from matplotlib.figure import Figure
 
 from asperity.errors import Argument, InputError, closest, require, require_known
 from asperity.figures.map import axis_unit, label
-from asperity.figures.style import new_figure
+from asperity.figures.style import new_figure, reason_of_gaps
 from asperity.parameters import MODULATION
 from asperity.parameters.arguments import file_path, number
+from asperity.study.points import SweepOutcome, reasons
 from asperity.study.results import dataset_of
 from asperity.study.store.store import SweepStore
 from asperity.units import KINDS, to_radians
+
+#: Characters of a line above the picture.
+_CHARACTERS = 66
 
 
 def plot_slice(
@@ -72,7 +76,9 @@ def plot_slice(
             whole, advice = row in range(count), "give the number of a row"
             require(whole, "at", f"be a row from 0 to {count - 1} of {dim}", f"{row:g}", advice)
             rows[i] = int(row)
-    values = opened.part(show, rows)
+    values, outcome, detail = (opened.part(name, rows) for name in (show, "outcome", "detail"))
+    codes = np.nan_to_num(outcome, nan=SweepOutcome.NOT_COMPUTED).astype(int)
+    failed = codes != SweepOutcome.CONVERGED
     part = part.isel({dims[i]: row for i, row in rows.items()}).copy(data=values)
     for side in filter(None, (x, y)):
         if numbered[side]:
@@ -103,6 +109,9 @@ def plot_slice(
         part.plot.pcolormesh(x=x, y=y, ax=axis, cbar_kwargs={"label": shown}, **options)
         axis.set_ylabel(labels[y])
     axis.set_xlabel(labels[x])
+    if failed.any():
+        text = reason_of_gaps(failed, reasons(codes, detail), _CHARACTERS)
+        figure.suptitle(text, fontsize="small")
     return figure
 
 

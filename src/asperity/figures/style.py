@@ -9,14 +9,17 @@ Figures and their numbers are the same bytes on disk whenever the same numbers a
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from io import BytesIO
 from pathlib import Path
 from string import ascii_lowercase
+from textwrap import fill
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -98,6 +101,25 @@ COLOURS = {
     "grey": GREY,
 }
 DASHES = {"slow": "solid", "fast": "dashed"}
+
+
+def reason_of_gaps(missing: Any, reasons: Any, width: int = 100) -> str:
+    """Why a figure has gaps, in lines of up to `width` characters; empty for one without.
+
+    Parameters
+    ----------
+    missing : bool array
+        Points without a value.
+    reasons : str array
+        Sentence of each point, same shape.
+    """
+    texts = Counter(np.asarray(reasons)[np.asarray(missing, bool)].astype(str).tolist())
+    if not texts:
+        return ""
+    (text, _), *others = texts.most_common()
+    more = f" (and {len(others)} other reasons)" if others else ""
+    gaps = f"{texts.total()} of {np.size(missing)} points have no value: {text}{more}"
+    return fill(gaps, width)
 
 
 @contextmanager

@@ -188,6 +188,14 @@ def test_points_without_response_are_hatched_and_named() -> None:
     dataset = planted(converged=(("K", "epsilon"), converged, units))
     assert "no response" in [entry.get_label() for entry in keys(dataset)]
     assert "no response" not in [entry.get_label() for entry in keys(planted())]
+    result = np.where(converged, "converged", "the branch folds back")
+    with style():
+        whole, gap = (
+            draw_map(d)
+            for d in (planted(), dataset.assign(result=(dataset.converged.dims, result)))
+        )
+    assert whole.get_suptitle() == ""
+    assert gap.get_suptitle() == "1 of 12 points have no value: the branch folds back"
 
 
 @pytest.mark.parametrize("show", ["phase1", "growth_rate", "delta_mu", "mu1"])

@@ -274,7 +274,9 @@ def test_a_damaged_chunk_is_not_read(
         file.write_bytes(left[fault])
     elif name == "status":
         # Without this file the chunk is not done; its values are those of an interrupted run.
-        values = plot_slice(out, "mu1", x="epsilon").axes[0].lines[0].get_ydata()
+        figure = plot_slice(out, "mu1", x="epsilon")
+        assert "points have no value: not computed yet" in figure.get_suptitle()
+        values = figure.axes[0].lines[0].get_ydata()
         assert np.isnan(values[10:]).all()
         assert np.isfinite(values[:10]).all()
         return
