@@ -18,6 +18,7 @@ from zarr.storage import LocalStore, WrapperStore
 
 from asperity.errors import InputError, require
 from asperity.outputs import output_file, require_disk, written_file
+from asperity.parameters import OUTPUTS
 from asperity.parameters.arguments import file_path, typed
 from asperity.study.axes import TEXTS
 from asperity.study.plan import OF_CHUNKS
@@ -169,8 +170,10 @@ def _bytes_in(path: Path) -> int:
 def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
     """Count, mean, standard deviation, smallest and largest value of every output.
 
-    Points without a converged answer are left out. The store is read a chunk at a time, so that
-    memory does not grow with the store.
+    Points without a converged answer are left out. The mean of an angle is that of its direction,
+    the argument of the mean R of exp(i angle), and its deviation sqrt(-2 ln abs(R)): phases next to
+    pi and to -pi are alike. The store is read a chunk at a time, so that memory does not grow with
+    the store.
 
     Raises
     ------
@@ -186,17 +189,22 @@ def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, flo
         for name in names:
             x = values[name][solved & np.isfinite(values[name])]
             if x.size:
-                parts[name].append((x.size, x.mean(), x.var(), x.min(), x.max()))
-    return {name: _pooled(part) for name, part in parts.items()}
+                moments = x.mean(), x.var(), np.exp(1j * x).mean()
+                parts[name].append((x.size, *moments, x.min(), x.max()))
+    angles = {name for name, output in OUTPUTS.items() if output.unit == "rad"}
+    return {name: _pooled(part, name in angles) for name, part in parts.items()}
 
 
-def _pooled(parts: list[tuple[float, ...]]) -> dict[str, float]:
+def _pooled(parts: list[tuple[Any, ...]], angle: bool) -> dict[str, float]:
     """Statistics of all values, pooled from those of the chunks; NaN without a value."""
     if not parts:
         return {"count": 0, **dict.fromkeys(("mean", "std", "min", "max"), math.nan)}
-    count, mean, variance, low, high = np.array(parts).T
+    count, mean, variance, turn, low, high = map(np.array, zip(*parts, strict=True))
     total = float(np.average(mean, weights=count))
     square = np.average(variance + (mean - total) ** 2, weights=count)
+    if angle:
+        direction = np.average(turn, weights=count)
+        total, square = float(np.angle(direction)), -2 * np.log(min(abs(direction), 1.0))
     return {"count": int(count.sum()), "mean": total, "std": math.sqrt(square),
             "min": float(low.min()), "max": float(high.max())}  # fmt: skip
 

@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 import xarray
 from click.testing import CliRunner
+from scipy.stats import circmean, circstd
 
 from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.figures.slice import plot_slice
+from asperity.parameters import OUTPUTS
 from asperity.study import (
     SweepPlan,
     export_store,
@@ -27,7 +29,7 @@ from asperity.study import (
     store_status,
     summary_statistics,
 )
-from asperity.study.points import Answers
+from asperity.study.points import Answers, SweepOutcome
 from asperity.study.store import root, store
 from asperity.study.store.layout import reset
 from asperity.study.store.lock import store_lock
@@ -552,6 +554,28 @@ def test_statistics_are_those_of_all_numbers(tmp_path: Path, closed_form: Closed
     assert statistics["mean"] == pytest.approx(np.nanmean(values), rel=1e-14)
     assert statistics["std"] == pytest.approx(np.nanstd(values), rel=1e-14)
     assert (statistics["min"], statistics["max"]) == (np.nanmin(values), np.nanmax(values))
+
+
+def test_the_mean_of_a_phase_is_that_of_its_direction(
+    tmp_path: Path, closed_form: ClosedForm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Phases next to pi and to -pi had the mean 0."""
+
+    def phases(law, points, record) -> Answers:
+        answers = Answers.empty(("phase1",), len(points))
+        answers.numbers["phase1"][:] = np.angle(-np.exp(1j * (points.values["epsilon"] - 0.2)))
+        answers.outcome[:] = SweepOutcome.CONVERGED
+        return answers
+
+    monkeypatch.setattr(closed_form, "outputs", (OUTPUTS["phase1"],))
+    monkeypatch.setattr(closed_form, "defaults", ("phase1",))
+    monkeypatch.setattr(closed_form, "solve_law", phases)
+    axes = {"epsilon": {"values": tuple(np.linspace(0.0, 0.5, 26).tolist())}}
+    run(tmp_path / "s.zarr", plan=SweepPlan(**{**dict(plan_of()), "axes": axes}))
+    x = open_store(tmp_path / "s.zarr")["phase1"].values
+    statistics = summary_statistics(tmp_path / "s.zarr")["phase1"]
+    assert statistics["mean"] == pytest.approx(circmean(x, np.pi, -np.pi), abs=1e-12)
+    assert statistics["std"] == pytest.approx(circstd(x, np.pi, -np.pi), rel=1e-9)
 
 
 def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedForm) -> None:
