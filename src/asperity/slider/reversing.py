@@ -75,7 +75,9 @@ def _velocity_slope(law: Law, friction: Array, state: tuple[Array, ...], w: Arra
 def reversing(motion: Motion) -> Motion:
     """The motion in states that are regular at rest, if its law allows rest.
 
-    A law allows rest if its velocity rises with the force at rest, too.
+    A law allows rest if its velocity rises with the force at rest, too. That of `regularised` is
+    below the range of doubles there if A is below about mu0/700: a motion that comes to rest then
+    ends, with the reason.
     """
     if not (isinstance(motion, StiffInertial) and motion.signed):
         return motion

@@ -31,7 +31,7 @@ _SENTENCES = {
     "rest": (
         "the slider came to rest at t = {time:.9g} s, where its velocity has no logarithm: "
         "inertia without elastic asperities takes it as a state; take a law that is smooth at "
-        "rest, such as 'regularised', or leave inertia out"
+        "rest, such as 'regularised' with A above mu0/700, or leave inertia out"
     ),
     "no accurate step": (
         "no step however short was accurate at t = {time:.9g} s; the equations of motion change "
