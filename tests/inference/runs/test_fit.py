@@ -325,6 +325,18 @@ def test_a_spike_as_small_as_changes_of_friction_is_left_out_by_the_fit():
     assert max(shifts) > 3
 
 
+def test_the_friction_at_the_load_is_of_a_recording_whose_load_changes():
+    """An offset of 0.05 in a gauge under a constant load shifted alpha by 6 standard errors."""
+    (constant,), (changing,) = (runs_of(CASES[name], 1) for name in ("steps", "loads"))
+    offset = replace(constant, name="constant", friction=constant.friction + 0.05)
+    for runs in ([offset, changing], [changing, offset]):
+        objective = objective_of(
+            get_law("linker-dieterich"), runs, [*FREE, "alpha"], Given({}, None, None, None)
+        )
+        assert objective.fixed["mu0"] == np.median(changing.friction[:16])
+        assert objective.fixed["V0"] == changing.velocity
+
+
 @pytest.mark.long
 def test_an_unknown_lag_of_the_gauge_leaves_no_stretch_out():
     """Many samples in a row that depart from the fit are a motion that the law cannot describe."""

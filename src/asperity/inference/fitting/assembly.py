@@ -253,7 +253,9 @@ def _of_readings(
         if not any(run.load_varies for run in recordings):
             counted = ("M", "eta", *motion)
             require_counted(fixed, motion, counted, "a recording of a constant load")
-        assumed = _reference_of(recordings[0], fixed, mu0_given=mu0_given)
+        # Under a constant load the offset of a recording takes up any mu0.
+        first = next((run for run in recordings if run.load_varies), recordings[0])
+        assumed = _reference_of(first, fixed, mu0_given=mu0_given)
     elif shared or "K" in fixed:
         require_newtons(recordings)
     # The gain of a gauge is a nuisance of recordings: its prior makes it free.
