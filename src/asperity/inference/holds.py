@@ -243,6 +243,7 @@ class HoldTerm(DataTerm):
         self.table, self.law, self.name = table, law, table.name
         self._fixed = {n: float(v) for n, v in fixed.items() if n in law_parameters(law)}
         self.error = 0.1 * float(np.ptp(table.healing)) or 1e-3
+        self._smallest = 1e-12 * self.error
         self._freedom = math.inf
 
     @property
@@ -265,8 +266,8 @@ class HoldTerm(DataTerm):
         model = "independent, normal, one error for all holds, estimated from the residuals"
         return {"model": model, **rows, "error": self.error}
 
-    def estimate_error(self, residuals: Residuals, information: Float) -> float:
-        """Set the error by the residuals at an estimate; the factor by which it has changed.
+    def scatter(self, residuals: Residuals, information: Float) -> float:
+        """The error by the residuals at an estimate.
 
         Parameters
         ----------
@@ -278,8 +279,7 @@ class HoldTerm(DataTerm):
         fitted = leverages(residuals.jacobian, information).sum()
         self._freedom = self.table.rows - float(fitted)
         factor = math.sqrt(float(np.sum(residuals.values**2)) / self._freedom)
-        self.error *= max(factor, 1e-12)
-        return factor
+        return max(factor * self.error, self._smallest)
 
     def residuals(self, values: Mapping[str, float]) -> Residuals | None:
         """Residuals in standard uncertainties; None where a hold has no solution."""

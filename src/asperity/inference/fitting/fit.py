@@ -12,6 +12,9 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import Annotated, Any
 
+from scipy.optimize import brentq
+
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.inference.fitting.assembly import Data, Given, listed_data, objective_of
 from asperity.inference.fitting.description import described_fit, failed_fit
@@ -39,8 +42,8 @@ from asperity.parameters.arguments import at_least, typed
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
-#: Largest number of rounds of estimating the error of holds; the relative change that ends them.
-_ROUNDS, _AGREED = 30, 1e-6
+#: Relative accuracy of the estimated error of holds.
+_AGREED = 1e-6
 
 
 @typed
@@ -208,20 +211,42 @@ def with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[M
     """Minima with errors that depend on a fit, best first: of holds without errors, of epsilon."""
     u = minima[0].u
     for hold in objective.terms_of(HoldTerm) if not objective.noise_is_known else ():
-        # With priors the estimates depend on the error, and the error on the estimates.
-        for _ in range(_ROUNDS):
-            data, (_, J) = objective.data_residuals(u), objective.residuals(u)
-            assert data is not None  # there is a solution at a minimum
-            changed = hold.estimate_error(data[0], J.T @ J)
-            objective.forget()
-            u = objective.minimise(u).u
-            if abs(changed - 1) < _AGREED:
-                break
+        u = _with_scatter(objective, hold, u)
     for table in objective.terms_of(LockInTerm):
         if table.measured_epsilon:
             table.estimate_error(objective.named(u))
     objective.forget()
     return sorted((objective.minimise(m.u) for m in minima), key=attrgetter("chi2"))
+
+
+def _with_scatter(objective: Objective, hold: HoldTerm, u: Float) -> Float:
+    """The minimum at which the error of holds is the scatter of the residuals; sets this error.
+
+    With priors the estimates depend on the error, and the error on the estimates.
+    """
+
+    def ratio(log_error: float) -> float:
+        """Logarithm of scatter over error; u becomes the minimum with this error."""
+        nonlocal u
+        hold.error = math.exp(log_error)
+        objective.forget()
+        u = objective.minimise(u).u
+        data, (_, J) = objective.data_residuals(u), objective.residuals(u)
+        assert data is not None  # there is a solution at a minimum
+        return math.log(hold.scatter(data[0], J.T @ J)) - log_error
+
+    # The scatter is bounded, so that steps of twice the difference pass it.
+    begin = math.log(hold.error)
+    step = ratio(begin)
+    while abs(step) > _AGREED:
+        end = begin + 2 * step
+        beyond = ratio(end)
+        if step * beyond <= 0:
+            begin = float(brentq(ratio, begin, end, xtol=_AGREED))
+            break
+        begin, step = end, beyond
+    ratio(begin)
+    return u
 
 
 class _Steps:
