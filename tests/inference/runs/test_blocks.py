@@ -151,6 +151,17 @@ def test_spikes_of_a_thousandth_of_the_samples_are_no_wrong_means(clean, ringing
     assert with_wrong_samples(run, ()).doubts == run.doubts
 
 
+def test_a_jump_of_the_gauge_is_at_the_beginning_of_a_mean(clean, ringing):
+    """At 7.5 s, where a block begins: no mean has a part of it."""
+    values = clean + ringing
+    values[18_000:] += 2e-3
+    run = cleaned(recorded(values), 100.0)
+    assert run.jumps == pytest.approx((7.5,), abs=1 / CASE.rate)
+    term = RunTerm(run, get_law("rice-ruina"), TRUTH | TRUE, RunOptions())
+    assert term.update_noise({})
+    assert term.wrong_samples({}) == ()
+
+
 def test_a_wrong_mean_is_left_out_of_wider_blocks_too(clean, ringing):
     run = cleaned(recorded(clean + ringing), 100.0)
     k = int(np.searchsorted(run.time, CASE.changes[0])) + 2

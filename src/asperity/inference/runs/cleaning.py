@@ -128,4 +128,4 @@ def with_jumps(run: RecordedRun) -> RecordedRun:
     cuts = sorted(map(int, bounds))
     stretches = [(a, b) for a, b in pairwise(cuts) if level[a]]
     jumps = find_jumps(run.friction, stretches)
-    return replace(run, jumps=tuple(sorted(float(time[jump.sample]) for jump in jumps)))
+    return replace(run, jumps=tuple(sorted(float(run.begins[jump.sample]) for jump in jumps)))

@@ -140,11 +140,15 @@ class RecordedRun:
         """Times (n,) of the samples, or edges (n, 2) of the blocks, in seconds."""
         return self.time if self.blocks is None else self.blocks.edges
 
+    @property
+    def begins(self) -> Float:
+        """Times of the samples, or of the beginnings of the blocks (s), shape (n,)."""
+        return self.time if self.blocks is None else self.blocks.edges[:, 0]
+
     @typed
     def rows_at(self, times: Sequence[float]) -> Index:
         """Indices of the samples, or of the blocks, at given times (s) of samples."""
-        begin = self.time if self.blocks is None else self.blocks.edges[:, 0]
-        return np.searchsorted(begin, times, side="right") - 1
+        return np.searchsorted(self.begins, times, side="right") - 1
 
     def recorded_times(self, times: Sequence[float] | Float) -> Float:
         """Times (s) from the first sample as times in the recording, as users give them."""
