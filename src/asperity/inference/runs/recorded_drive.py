@@ -155,46 +155,6 @@ def recorded_load(
     return t[order], W[order]
 
 
-def joined_drive(
-    time: Float, segments: Partition, course: LoadCourse
-) -> tuple[Drive, tuple[int, ...]]:
-    """The drive from the first sample on, and its edges at which the velocity changes.
-
-    Parameters
-    ----------
-    time : array, shape (n,)
-        Times of the samples (s).
-    segments : Partition
-    course : LoadCourse
-    """
-    times, knots = time - time[0], course.times - time[0]
-    cut_times = _with_corners(times, [cut.time - time[0] for cut in segments.cuts], knots)
-    edges = np.unique(np.concatenate([[0.0, times[-1]], cut_times, knots]))
-    middle = (edges[1:] + edges[:-1]) / 2
-    piece = np.searchsorted(np.asarray(cut_times), middle)
-    pull = np.asarray(segments.velocities)[piece] / segments.velocities[0]
-    at_edges = np.interp(edges, knots, course.values / course.values[0])
-    slope = np.diff(at_edges) / np.diff(edges)
-    cuts = np.searchsorted(edges, cut_times).tolist()
-    return Drive(edges, pull, at_edges[:-1], slope), tuple(cuts)
-
-
-def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
-    """Times of velocity changes; those within a sampling interval of a load corner move to it.
-
-    The drive then changes velocity and load at once. The time of a corner is known to a fraction of
-    the interval, that of a velocity change is not; a short piece between them would leave no room
-    for the delay of the change.
-    """
-    moved = []
-    for cut in cut_times:
-        k = int(np.clip(np.searchsorted(times, cut), 1, times.size - 1))
-        corner = float(knots[np.argmin(np.abs(knots - cut))])
-        close = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
-        moved.append(corner if close else cut)
-    return sorted(set(moved)) if len(set(moved)) == len(moved) else list(cut_times)
-
-
 class LoadCourse(NamedTuple):
     """A piecewise linear load.
 
@@ -390,3 +350,43 @@ def _needed_knots(
             break
         at = np.delete(at, 1 + np.flatnonzero(gone))
     return at.tolist()
+
+
+def joined_drive(
+    time: Float, segments: Partition, course: LoadCourse
+) -> tuple[Drive, tuple[int, ...]]:
+    """The drive from the first sample on, and its edges at which the velocity changes.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Times of the samples (s).
+    segments : Partition
+    course : LoadCourse
+    """
+    times, knots = time - time[0], course.times - time[0]
+    cut_times = _with_corners(times, [cut.time - time[0] for cut in segments.cuts], knots)
+    edges = np.unique(np.concatenate([[0.0, times[-1]], cut_times, knots]))
+    middle = (edges[1:] + edges[:-1]) / 2
+    piece = np.searchsorted(np.asarray(cut_times), middle)
+    pull = np.asarray(segments.velocities)[piece] / segments.velocities[0]
+    at_edges = np.interp(edges, knots, course.values / course.values[0])
+    slope = np.diff(at_edges) / np.diff(edges)
+    cuts = np.searchsorted(edges, cut_times).tolist()
+    return Drive(edges, pull, at_edges[:-1], slope), tuple(cuts)
+
+
+def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
+    """Times of velocity changes; those within a sampling interval of a load corner move to it.
+
+    The drive then changes velocity and load at once. The time of a corner is known to a fraction of
+    the interval, that of a velocity change is not; a short piece between them would leave no room
+    for the delay of the change.
+    """
+    moved = []
+    for cut in cut_times:
+        k = int(np.clip(np.searchsorted(times, cut), 1, times.size - 1))
+        corner = float(knots[np.argmin(np.abs(knots - cut))])
+        close = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
+        moved.append(corner if close else cut)
+    return sorted(set(moved)) if len(set(moved)) == len(moved) else list(cut_times)
