@@ -73,8 +73,6 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
             return replace(run, spikes=(), doubts=(*run.doubts, doubt))
     else:
         wrong = np.searchsorted(run.time, run.spikes)
-    if not wrong.size:
-        return replace(run, spikes=()) if run.spikes is None else run
     return replace(
         run, friction=without(run.friction, wrong), spikes=tuple(run.time[wrong].tolist())
     )
