@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -92,10 +93,13 @@ class Coordinates(NamedTuple):
         """Unbounded coordinates of u, which must lie within the range."""
         return np.asarray(np.log(u - self.low) - np.log(self.high - u))
 
+    # Outside of programs each of these is one, not one for each operation.
+    @jax.jit
     def to_u(self, q: Any) -> Any:
         """Coordinates of the fit, for q of shape (..., n)."""
         return self.low + (self.high - self.low) / (1 + jnp.exp(-q))
 
+    @jax.jit
     def log_slope(self, q: Any) -> Array:
         """ln(du/dq) of each coordinate."""
         return jnp.log(self.high - self.low) - jnp.logaddexp(0.0, q) - jnp.logaddexp(0.0, -q)
@@ -109,6 +113,7 @@ class Coordinates(NamedTuple):
         """1 for a normal prior of exp(u), whose density in u has a factor exp(u); else 0."""
         return (self.precision > 0) & self.logarithmic
 
+    @jax.jit
     def log_prior(self, u: Any) -> Array:
         """Logarithm of the prior density of u, up to a constant, shape (..., n) to (...)."""
         normal = -0.5 * ((self.values(u) - self.mean) * self.precision) ** 2
