@@ -199,25 +199,30 @@ def packed(zeros):
     return file.getvalue()
 
 
+#: Each is made by its test alone: some are of megabytes.
 HOSTILE = {
-    "empty": b"",
-    "zip": b"PK\x03\x04" + b"\0" * 1000,
-    "hdf5 garbage": b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 8,
-    "gzip cut": gzip.compress(b"1,2\n" * 10_000)[:-30],
-    "no numbers": b"time,load,force\n" + b"nan,nan,nan\n" * 200,
-    "binary": bytes(range(256)) * 40,
-    "words": b"hello world, this is a text\n" * 50,
-    "matlab garbage": b"MATLAB 5.0 MAT-file" + b"\xff" * 500,
-    "tdms garbage": b"TDSm" + b"\xff" * 500,
-    "a cell without end": b"time,load,force\n" + b"9" * 100_000,
-    "json that is no reading": b'{"mode": [' * 50,
-    "json without end": b"[" * 100_000,
-    "a million columns": b",".join(b"c%d" % i for i in range(10**6)) + b"\n" + b"1," * 10**6,
-    "a line without end": b"1" * 10**7,
-    "an archive of zeros": packed(zeros=50),
-    "zeros": gzip.compress(b"\0" * 10**7),
-    "code in numpy's file": b"\x93NUMPY\x01\x00v\x00{'descr': '|O'}\n\x80\x04cos\nsystem\n.",
-    "code in a pickle": b"\x80\x04cos\nsystem\n(X\x02\x00\x00\x00lstR.",
+    "empty": lambda: b"",
+    "zip": lambda: b"PK\x03\x04" + b"\0" * 1000,
+    "hdf5 garbage": lambda: b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 8,
+    "gzip cut": lambda: gzip.compress(b"1,2\n" * 10_000)[:-30],
+    "no numbers": lambda: b"time,load,force\n" + b"nan,nan,nan\n" * 200,
+    "binary": lambda: bytes(range(256)) * 40,
+    "words": lambda: b"hello world, this is a text\n" * 50,
+    "matlab garbage": lambda: b"MATLAB 5.0 MAT-file" + b"\xff" * 500,
+    "tdms garbage": lambda: b"TDSm" + b"\xff" * 500,
+    "a cell without end": lambda: b"time,load,force\n" + b"9" * 100_000,
+    "json that is no reading": lambda: b'{"mode": [' * 50,
+    "json without end": lambda: b"[" * 100_000,
+    "a million columns": lambda: (
+        b",".join(b"c%d" % i for i in range(10**6)) + b"\n" + b"1," * 10**6
+    ),
+    "a line without end": lambda: b"1" * 10**7,
+    "an archive of zeros": lambda: packed(zeros=50),
+    "zeros": lambda: gzip.compress(b"\0" * 10**7),
+    "code in numpy's file": lambda: (
+        b"\x93NUMPY\x01\x00v\x00{'descr': '|O'}\n\x80\x04cos\nsystem\n."
+    ),
+    "code in a pickle": lambda: b"\x80\x04cos\nsystem\n(X\x02\x00\x00\x00lstR.",
 }
 
 
@@ -225,7 +230,7 @@ HOSTILE = {
 def test_what_is_no_recording_gets_a_sentence(measured_here, what, tmp_path):
     """What the process does that reads a file."""
     with pytest.raises(InputError, match=" must ") as refused:
-        measured_here(HOSTILE[what])
+        measured_here(HOSTILE[what]())
     assert str(tmp_path) not in str(refused.value)
     assert "0123" not in str(refused.value)
 
@@ -250,7 +255,7 @@ def test_a_sentence_names_what_the_page_names(measured_here, content, source, be
 
 
 def test_the_sentence_of_a_file_reaches_the_page(measured):
-    *_, last = measured(HOSTILE["hdf5 garbage"], "garbage.h5")
+    *_, last = measured(HOSTILE["hdf5 garbage"](), "garbage.h5")
     assert last["done"]
     assert "garbage.h5" in last["error"]
     assert " must " in last["error"]
