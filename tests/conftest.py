@@ -32,9 +32,10 @@ os.fsync = lambda descriptor: None
 # process. NumPy reads this variable when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-#: Rooms that take longest from an empty compilation cache; they run first.
+#: Rooms that take longest from an empty compilation cache; they run first. `app` waits for a
+#: browser and for processes: at the end the other process would have nothing left to run meanwhile.
 LONGEST = (
-    *("orbit", "inference", "papers", "branches", "docs", "transients", "study", "app"),
+    *("app", "orbit", "inference", "papers", "branches", "docs", "transients", "study"),
     *("measurement", "cli", "laws", "theory", "lock_in"),
 )
 
