@@ -166,33 +166,29 @@ def test_a_law_without_free_parameters_has_a_curve_without_a_width(fitted, tmp_p
 def test_recordings_are_shown_with_the_motion(tmp_path):
     (run,) = runs_of(CASES["steps"], 1)
     own = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
-    write_report(tmp_path / "fit", own)
-    write_comparison(tmp_path / "laws", judge({"rice-ruina": own, "the same": own}))
+    # The page has the chosen names, in warnings too; numbers in files have those of friction.
+    warned = replace(own, sentences=(f"{named('D0')} is at its bound",))
+    assert warned.warnings == ("D0 is at its bound",)
+    compared = judge({"rice-ruina": warned, "the same": warned})
+    write_report(tmp_path / "fit", warned, names="geophysics")
+    write_comparison(tmp_path / "laws", compared, "geophysics")
     for folder in ("fit", "laws"):
         page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
         assert page.count("<svg") == 1
         assert "AR(" in page
         assert nothing_is_fetched(page)
-    # The time of the recording.
-    late = replace(run, origin=3e4)
-    figure = run_figure(late, {"rice-ruina": late.friction})
-    assert figure.axes[0].lines[0].get_xdata()[0] == 3e4
-    # The page has the chosen names, in warnings too; numbers in files have those of friction.
-    warned = replace(own, sentences=(f"{named('D0')} is at its bound",))
-    assert warned.warnings == ("D0 is at its bound",)
-    compared = judge({"rice-ruina": warned, "the same": warned})
-    write_report(tmp_path / "faults", warned, names="geophysics")
-    write_comparison(tmp_path / "other laws", compared, "geophysics")
-    for folder in ("faults", "other laws"):
-        page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
         assert "<td>D_c</td>" in page
         assert "<td>D0</td>" not in page
         assert "D_c is at its bound" in page
-    assert '"D0"' in (tmp_path / "faults" / "fit.json").read_text(encoding="utf-8")
+    assert '"D0"' in (tmp_path / "fit" / "fit.json").read_text(encoding="utf-8")
     # A stiffness under a stress is none of a material, whose springs are in N/m.
     material = (tmp_path / "fit" / "material.toml").read_text(encoding="utf-8")
     assert "[numbers.D0]" in material
     assert "[numbers.K]" not in material
+    # The time of the recording.
+    late = replace(run, origin=3e4)
+    figure = run_figure(late, {"rice-ruina": late.friction})
+    assert figure.axes[0].lines[0].get_xdata()[0] == 3e4
 
 
 def test_a_comparison_without_a_fit_is_refused(fitted, tmp_path):
