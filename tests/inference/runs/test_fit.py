@@ -13,6 +13,7 @@ from asperity import materials
 from asperity.errors import InputError, worded
 from asperity.fit_report.folder import material_text, provenance
 from asperity.inference import Prior, RunOptions, fit, recorded_run
+from asperity.inference.fitting.assembly import Given, objective_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import (
