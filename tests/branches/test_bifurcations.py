@@ -1,6 +1,7 @@
 """Bifurcations of the package against shooting on the equations as printed."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -217,6 +218,17 @@ def test_an_orbit_without_multipliers_is_not_stable(stabilised, rapid, monkeypat
     )
     assert len(branch.parameter) == 3
     assert "could not be followed" in branch.result
+
+
+@pytest.mark.parametrize("change", [{"unstable": 1}, {"direction": -1.0}])
+def test_a_bifurcation_that_is_not_located_is_missed_in_words(change):
+    """Where Newton's method fails between two orbits, a change of stability was left out."""
+    fails = SimpleNamespace(crossing=lambda *arguments: None)
+    here = SimpleNamespace(t=0.1, unstable=0, direction=1.0)
+    there = SimpleNamespace(**{**vars(here), "t": 0.2, **change})
+    branch = bifurcations.ParameterBranch(fails, here, 10)
+    branch.accept(np.arange(1), np.arange(1), SimpleNamespace(next=there, length=np.array([0.1])))
+    assert (branch.bifurcations, branch.missed) == ([], [0.1])
 
 
 def test_a_dataset_has_units_and_provenance(hysteresis, tmp_path):

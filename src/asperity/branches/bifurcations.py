@@ -222,6 +222,8 @@ class ParameterBranch(Curves):
     orbits : list of BranchOrbit
     bifurcations : list of (LocatedBifurcation, int)
         Those within the span, each with the index of the orbit before it.
+    missed : list of float
+        Values of t after which stability changes at a bifurcation that is not located.
     last_length : float
         Length of the last step.
     """
@@ -247,6 +249,7 @@ class ParameterBranch(Curves):
         self.follower, self.most_steps, self.report = follower, most_steps, report
         self.orbits, self.last_length = [start], 0.0
         self.bifurcations: list[tuple[LocatedBifurcation, int]] = []
+        self.missed: list[float] = []
 
     def follow(self) -> str:
         """Follow the branch; why it ends: "end", "start", "steps" or "stuck"."""
@@ -269,7 +272,9 @@ class ParameterBranch(Curves):
         """Keep the new orbit and the bifurcations before it; the branch ends outside the span."""
         here, there, self.last_length = self.orbits[-1], attempt.next, float(attempt.length[0])
         for located in bifurcations_between(self.follower, here, self.last_length, there):
-            if 0 <= located.branch_orbit.t <= 1:
+            if located is None:
+                self.missed.append(here.t)
+            elif 0 <= located.branch_orbit.t <= 1:
                 self.bifurcations.append((located, len(self.orbits) - 1))
         self.orbits.append(there)
         self.report(1)
@@ -315,19 +320,25 @@ class LocatedBifurcation(NamedTuple):
 
 def bifurcations_between(
     follower: BranchFollower, start: BranchOrbit, length: float, end: BranchOrbit
-) -> Iterator[LocatedBifurcation]:
-    """All bifurcations between two neighbouring orbits."""
+) -> Iterator[LocatedBifurcation | None]:
+    """All bifurcations between two neighbouring orbits.
+
+    None for those that are not located, because Newton's method fails between the orbits.
+    """
     before, after = start.unstable, end.unstable
     turned = start.direction * end.direction < 0
     if turned:
         index = min(before, after) if before != after else 0
         critical_orbit = follower.crossing(start, criterion("fold", index), (length, end))
-        if critical_orbit is not None:
+        if critical_orbit is None:
+            yield None
+        else:
             yield LocatedBifurcation("fold", critical_orbit, index, before, after)
     index, last = min(before, after), max(before, after)
     while index < last:
         critical_orbit = follower.crossing(start, criterion(None, index), (length, end))
         if critical_orbit is None:
+            yield None
             return
         kind = kind_of(critical_orbit.logs[index])
         if kind == "branch point" and turned:

@@ -121,7 +121,7 @@ class Branch(Displayed):
     bifurcations : tuple of Bifurcation
         In the order of the branch.
     result : str
-        Reason why the branch ends.
+        Reason why the branch ends, and where a bifurcation was not located.
     completed : bool
         Whether the branch ends at an end of the span.
     motion : Motion

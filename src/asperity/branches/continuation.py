@@ -35,7 +35,7 @@ from asperity.branches.parameters import (
     moving_parameter,
     one_problem,
 )
-from asperity.errors import InputError, require
+from asperity.errors import InputError, listed, require
 from asperity.loads import Excitation, Modulation
 from asperity.orbit.mesh.arclength import ContinuationPoint, ParameterLine, slip_units, weighted_row
 from asperity.orbit.mesh.equations import condensed, transfer_maps
@@ -74,6 +74,10 @@ def _followed(
     orbits = followed.orbits
     values = moving.value(np.array([s.t for s in orbits]))
     unit = f" {moving.unit}" if moving.unit else ""
+    result = _RESULTS[why].format(value=values[-1], unit=unit, steps=len(orbits) - 1)
+    if followed.missed:
+        near = listed(f"{value:.6g}{unit}" for value in moving.value(np.array(followed.missed)))
+        result += f"; a bifurcation was not located after {near}"
     return Branch(
         name=moving.name,
         unit=moving.unit,
@@ -85,7 +89,7 @@ def _followed(
         bifurcations=tuple(
             _bifurcation(follower, moving, located, at) for located, at in followed.bifurcations
         ),
-        result=_RESULTS[why].format(value=values[-1], unit=unit, steps=len(orbits) - 1),
+        result=result,
         completed=why in ("end", "start"),
         motion=problem.system,
         fixed=fixed_parameters(problem, moving.name),

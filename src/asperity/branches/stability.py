@@ -442,12 +442,13 @@ def stability_boundary(
     curves: list[TracedBoundary] = []
     unsearched = []
     for at, direction in _scan_lines(lines):
-        crossings, reached = _crossings(plane, at, direction)
-        if reached < 1:
-            moving, fixed = parameters[:: -1 if direction[1] else 1]
-            last, there = moving.value(reached), fixed.value(at.max())
-            rest = f"{moving.name} beyond {last:.4g} {moving.unit}".rstrip()
-            unsearched.append(f"{rest} at {fixed.name} = {there:.4g} {fixed.unit}".rstrip())
+        crossings, reached, missed = _crossings(plane, at, direction)
+        moving, fixed = parameters[:: -1 if direction[1] else 1]
+        there = f"at {fixed.name} = {fixed.value(at.max()):.4g} {fixed.unit}".rstrip()
+        gaps = [("beyond", reached)] * (reached < 1) + [("next to", t) for t in missed]
+        for where, t in gaps:
+            rest = f"{moving.name} {where} {moving.value(t):.4g} {moving.unit}".rstrip()
+            unsearched.append(f"{rest} {there}")
         for kind, crossing in crossings:
             if not any(_lies_on(curve, kind, crossing) for curve in curves):
                 curves.append(trace_boundary(plane, kind, crossing, partial(report, 0)))
@@ -473,12 +474,12 @@ def _scan_lines(lines: int) -> list[tuple[Float, Float]]:
 
 def _crossings(
     plane: ParameterPlane, at: Float, direction: Float
-) -> tuple[list[tuple[Any, BoundaryPoint]], float]:
-    """Bifurcations on a line, and the share of it that could be followed."""
+) -> tuple[list[tuple[Any, BoundaryPoint]], float, list[float]]:
+    """Bifurcations on a line, the share of it that could be followed, and those not located."""
     follower = plane.follower(at, direction)
     start = follower.begin()
     if start is None:
-        return [], 0.0
+        return [], 0.0, []
     branch = ParameterBranch(follower, start, _SCAN_STEPS)
     branch.follow()
     crossings = [
@@ -486,7 +487,7 @@ def _crossings(
         for b, _ in branch.bifurcations
         if b.kind != "branch point"
     ]
-    return crossings, max(orbit.t for orbit in branch.orbits)
+    return crossings, max(orbit.t for orbit in branch.orbits), branch.missed
 
 
 def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:
