@@ -10,6 +10,8 @@ from click.testing import CliRunner
 
 from asperity.cli.main import main
 from asperity.errors import InputError
+from asperity.inference import answers
+from asperity.inference.fitting.result import Fit
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +44,17 @@ def test_a_recording_is_fitted(recording):
     assert abs(K["value"] - 4e3) < 4 * K["se"]
     assert record["noise"]["model"].startswith("AR(")
     assert record["noise"]["effective_samples"] < 700
+
+
+def test_files_that_a_lost_fit_does_not_have_are_named(recording, monkeypatch, tmp_path):
+    """Only the exit code said that there is no report and no figure."""
+    lost = Fit("rice-ruina", False, "the search ended", {}, objective=None)
+    monkeypatch.setattr(answers, "answer_fit", lambda question, progress: lost)
+    report, figure = tmp_path / "report", tmp_path / "fit.png"
+    result = run_fit(recording, "--law", "rice-ruina", "--report", report, "--plot", figure)
+    assert result.exit_code == 1
+    assert f"there is no report {report}: the search ended" in result.stderr
+    assert f"there is no figure {figure}: the search ended" in result.stderr
 
 
 def test_priors_of_a_material_want_the_free_parameters(recording):

@@ -232,16 +232,23 @@ def fit(
         ],
         result.law,
     )
-    if report is not None and result.converged:
+    if not result.converged:
+        _say_missing(result.message, report=report, figure=output.plot, posterior=out)
+        return 1
+    if report is not None:
         _say_written(report)
-    if result.converged:
-        output.draw(result.plot)
-    return 0 if result.converged and (sampled is None or sampled.converged) else 1
+    output.draw(result.plot)
+    return 0 if sampled is None or sampled.converged else 1
 
 
 def _say_written(report: Path) -> None:
     files = ", ".join(sorted(p.name for p in report.iterdir() if p.name != "report.html"))
     say(f"the report is {report / 'report.html'}, with {files}")
+
+
+def _say_missing(why: str, **paths: Path | None) -> None:
+    """Say which of the files that were asked for are not written."""
+    say(*(f"there is no {what} {path}: {why}" for what, path in paths.items() if path is not None))
 
 
 def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None) -> None:
@@ -328,11 +335,13 @@ def compare(
         lambda: comparison_report(comparison),
         comparison.best,
     )
-    if report is not None and comparison.best:
+    if not comparison.best:
+        _say_missing("no fit converged", report=report, figure=output.plot)
+        return 1
+    if report is not None:
         from asperity.fit_report import write_comparison
 
         write_comparison(report, comparison, output.names)
         _say_written(report)
-    if comparison.best:
-        output.draw(comparison.plot)
+    output.draw(comparison.plot)
     return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1
