@@ -99,7 +99,7 @@ class Motion(eqx.Module):
 
     def steady_under(self, at: Excitation) -> Array:
         """States of steady sliding under the load and at the pull of `at`, shape (size, ...)."""
-        law, v = self.slider.law, self.V * at.pull * jnp.ones_like(at.w)
+        law, v = self.slider.law, jnp.asarray(self.V * at.pull * jnp.ones_like(at.w))
         state = steady_state(law, v, at.w)
         friction = law.friction(v, state, at.w)
         mechanical = self.mechanical_states(friction, at.pull, jnp.log(at.pull), at)

@@ -176,7 +176,8 @@ def _require_drive_in_steps(plan: Sweep, table: TransientTable) -> None:
     ratios = {n: ratio.parameter for n, ratio in RATIOS.items() if ratio.target in drive}
     for written, place in given.items():
         name = canonical_name(written, {**drive, **ratios, **MODULATION})
-        name = RATIOS[name].target if name in RATIOS else name
+        if name is not None and name in RATIOS:
+            name = RATIOS[name].target
         rule, advice = "stand in a step", "write it into one, in braces, or leave it out"
         require(name is None or name in used, place, rule, f"no '{{{name}}}'", advice)
 
