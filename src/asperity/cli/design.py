@@ -86,7 +86,7 @@ def _sections(result: Design) -> list[Section]:
     title = f"{plan.truth.law.name}: {result.readings} readings {aim}"
     points = Section(title, head=(*map(symbol, axes), "readings", *plan.noise), rows=tuple(rows))
     numbers = tuple(
-        (symbol(n), f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
+        (symbol(n), f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_even_grid:.3g}", p.unit)
         for n, p in result.parameters.items()
     )
     head = ("", "expected", "std. error", "even grid", "")
@@ -138,9 +138,9 @@ def _separation(result: Design, rival: str) -> str:
         f"{x:.{digits}g}" if x is not None and math.isfinite(x) else "unknown"
         for x, digits in (
             (result.chi2, 4),
-            (result.chi2_grid, 4),
+            (result.chi2_even_grid, 4),
             (result.probability, 3),
-            (result.probability_grid, 3),
+            (result.probability_even_grid, 3),
         )
     )
     return (

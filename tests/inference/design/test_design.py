@@ -75,7 +75,7 @@ def test_simulated_fits_spread_as_expected(result):
 
 def test_the_design_beats_the_grid_as_its_errors_say(result):
     error = result.parameters["lambda"]
-    assert result.fewer == pytest.approx((error.se_grid / error.se) ** 2, rel=1e-3)
+    assert result.fewer == pytest.approx((error.se_even_grid / error.se) ** 2, rel=1e-3)
     assert result.fewer > 1
     assert result.efficiency >= 0.999
     # Eight whole readings of three parameters lose little.
@@ -189,7 +189,7 @@ def test_a_rival_at_a_bound_of_its_parameters_is_excluded_as_its_misfit_says():
 def test_where_the_rival_loses_its_response_its_misfit_is_a_bound(monkeypatch):
     monkeypatch.setattr(RivalFit, "reached", lambda fits, n, end: False)
     result = design(ONE_POINT)
-    assert result.probability is result.probability_grid is None
+    assert result.probability is result.probability_even_grid is None
     assert np.isnan(result.fewer)
     assert result.efficiency == result.efficiency_whole == 0
     assert sum("next to values with which it has no response" in w for w in result.warnings) == 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -13,7 +13,6 @@ import numpy as np
 from asperity._version import __version__
 from asperity.arrays import Float
 from asperity.errors import InputError, named
-from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import (
     Candidates,
     Progress,
@@ -23,7 +22,6 @@ from asperity.inference.design.candidates import (
     labelled,
     predicted,
     some_of,
-    with_readings,
 )
 from asperity.inference.design.criteria import Determinant, Misfit
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
@@ -31,8 +29,12 @@ from asperity.inference.design.rival import (
     RivalFit,
     prior_rows,
     probability_of_deciding,
-    reached,
     separation,
+)
+from asperity.inference.design.simulation import (
+    Simulated,
+    deviations_of_simulation,
+    simulated,
 )
 from asperity.inference.design.weights import (
     EvenGrid,
@@ -44,35 +46,34 @@ from asperity.inference.design.weights import (
 )
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.fitting.result import Warned
-from asperity.inference.objective import Objective, aicc_penalty
-from asperity.inference.tables.residuals import leverages
-from asperity.inference.tables.table import OBSERVABLES, LockInTable
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.objective import Objective
+from asperity.inference.tables.table import LockInTable
 from asperity.parameters.arguments import at_least, typed
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """Results of fits to synthetic readings.
+class PredictedReading(NamedTuple):
+    """Expected reading of an observable, and its standard uncertainty."""
+
+    value: float
+    uncertainty: float
+
+
+class AtOneLevel(NamedTuple):
+    """A design of which all points have one level of an axis, the other axes being chosen best.
 
     Attributes
     ----------
-    sets : int
-        Number of fits that converged.
-    failed : int
-    spread : mapping of str to float
-        Standard deviation of the estimates in SI: half the width of the central 68 %.
-    uncertainty : mapping of str to float
-        Standard error of that spread, by bootstrap.
-    decided : float or None
-        Share of the sets that exclude the rival.
+    level : float
+        Value of the axis, in SI.
+    candidates : int
+        Number of candidates with this level.
+    times_more : float
+        Factor by which the readings increase.
     """
 
-    sets: int
-    failed: int
-    spread: Mapping[str, float]
-    uncertainty: Mapping[str, float]
-    decided: float | None = None
+    level: float
+    candidates: int
+    times_more: float
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,14 @@ class DesignedPoint:
     readings : int
     time : float or None
         Time of all readings (s), including settling; None if the budget is a number of readings.
-    predicted : mapping of str to (float, float)
-        Expected reading of each observable, and its standard uncertainty.
+    predicted : mapping of str to PredictedReading
+        By observable.
     """
 
     setting: Mapping[str, float]
     readings: int
     time: float | None
-    predicted: Mapping[str, tuple[float, float]]
+    predicted: Mapping[str, PredictedReading]
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class ExpectedError:
     se : float
         Standard error by the readings of the design; infinite if they do not determine the
         parameter.
-    se_grid : float
+    se_even_grid : float
         Standard error by the even grid of the same budget.
     """
 
@@ -116,7 +117,7 @@ class ExpectedError:
     unit: str
     value: float
     se: float
-    se_grid: float
+    se_even_grid: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,13 +149,11 @@ class Design(Warned):
         Number of usable points, and of all combinations of the plan.
     left_out : mapping of str to int
         Number of combinations that are no candidates, by reason.
-    alone : mapping of str to tuple of (float, int, float)
-        For designs that measure parameters, and for each level of an axis: its value, the number of
-        candidates with this level, and the factor by which the readings increase if all points
-        have this level, with the other axes chosen best.
-    chi2, chi2_grid : float or None
+    alone : mapping of str to tuple of AtOneLevel
+        For designs that measure parameters: the levels of each axis.
+    chi2, chi2_even_grid : float or None
         Expected excess of chi-squared of the refitted rival.
-    probability, probability_grid : float or None
+    probability, probability_even_grid : float or None
         Probability of excluding the rival; None if its fit has not reached a minimum.
     rival_values : mapping of str to float or None
         Parameters of the rival's best fit to the readings of the design.
@@ -177,11 +176,11 @@ class Design(Warned):
     candidates: int
     combinations: int
     left_out: Mapping[str, int]
-    alone: Mapping[str, tuple[tuple[float, int, float], ...]] = field(default_factory=dict)
+    alone: Mapping[str, tuple[AtOneLevel, ...]] = field(default_factory=dict)
     chi2: float | None = None
-    chi2_grid: float | None = None
+    chi2_even_grid: float | None = None
     probability: float | None = None
-    probability_grid: float | None = None
+    probability_even_grid: float | None = None
     rival_values: Mapping[str, float] | None = None
     simulation: Simulated | None = None
     sentences: tuple[str, ...] = ()
@@ -199,9 +198,7 @@ class Design(Warned):
                     **p.setting,
                     "readings": p.readings,
                     "time": p.time,
-                    "predicted": {
-                        n: {"value": v, "uncertainty": e} for n, (v, e) in p.predicted.items()
-                    },
+                    "predicted": {n: reading._asdict() for n, reading in p.predicted.items()},
                 }
                 for p in self.points
             ],
@@ -210,7 +207,7 @@ class Design(Warned):
             "efficiency_bound": self.efficiency,
             "efficiency_bound_whole": self.efficiency_whole,
             "parameters": {
-                n: {"value": p.value, "unit": p.unit, "se": p.se, "se_even_grid": p.se_grid}
+                n: {k: v for k, v in vars(p).items() if k != "name"}
                 for n, p in self.parameters.items()
             },
             "correlation": {"names": list(self.parameters), "matrix": self.correlation.tolist()},
@@ -221,11 +218,7 @@ class Design(Warned):
                 "times_fewer": self.fewer,
             },
             "alone": {
-                axis: [
-                    {"level": level, "candidates": count, "times_more": more}
-                    for level, count, more in levels
-                ]
-                for axis, levels in self.alone.items()
+                axis: [level._asdict() for level in levels] for axis, levels in self.alone.items()
             },
             "candidates": {
                 "combinations": self.combinations,
@@ -236,27 +229,21 @@ class Design(Warned):
             "asperity_version": __version__,
         }
         if plan.rival is not None:
-            result["separation"] = {
-                "chi2": self.chi2,
-                "chi2_even_grid": self.chi2_grid,
-                "probability": self.probability,
-                "probability_even_grid": self.probability_grid,
-                "rival_values": dict(self.rival_values or {}),
-            }
+            numbers = ("chi2", "chi2_even_grid", "probability", "probability_even_grid")
+            result["separation"] = {name: getattr(self, name) for name in numbers}
+            result["separation"]["rival_values"] = dict(self.rival_values or {})
         if self.simulation is not None:
             s = self.simulation
             result["simulation"] = {
-                "sets": s.sets,
-                "failed": s.failed,
-                "decided": s.decided,
-                "parameters": {
-                    n: {
-                        "spread": s.spread[n],
-                        "uncertainty": s.uncertainty[n],
-                        "predicted": self.parameters[n].se,
-                    }
-                    for n in s.spread
-                },
+                name: getattr(s, name) for name in ("sets", "failed", "decided")
+            }
+            result["simulation"]["parameters"] = {
+                n: {
+                    "spread": spread,
+                    "uncertainty": s.uncertainty[n],
+                    "predicted": self.parameters[n].se,
+                }
+                for n, spread in s.spread.items()
             }
         return result
 
@@ -288,9 +275,6 @@ class Design(Warned):
 _TRUSTED = 0.95
 #: With fewer candidates per free parameter, the ranges decide the design.
 _FEW = 3
-#: A warning is given if the simulated spread differs from the expected one by more than this many
-#: standard errors of the spread, plus this share of the expected spread.
-_SURPRISING, _LINEAR = 3.0, 0.1
 #: Two laws give the same readings if the mean chi-squared of a reading is lower. Among pairs of
 #: eight laws with numbers of PMMA it is 1e-27 if one law contains the other, and at least 1
 #: otherwise.
@@ -393,26 +377,23 @@ class _Task:
         alone = self._alone(criterion, value)
         return self._described(n, efficiency, whole, simulate, fewer=fewer, alone=alone)
 
-    def _alone(
-        self, criterion: Determinant, value: float
-    ) -> dict[str, tuple[tuple[float, int, float], ...]]:
-        """For each level of each axis, the increase of readings if all points have this level."""
-        result: dict[str, tuple[tuple[float, int, float], ...]] = {}
-        for axis, values in self.plan.axes.items():
-            if values.size == 1:
-                continue
-            levels = []
-            for level in values:
-                rows = np.flatnonzero(self.candidates.points[axis] == level)
-                more = math.inf
-                if rows.size:
-                    part = criterion.restricted(rows)
-                    readings = self.plan.budget / self.cost[rows]
-                    n = optimal_weights(part, readings)[0] * readings
-                    more = times_fewer(part, n, value)
-                levels.append((float(level), int(rows.size), more))
-            result[axis] = tuple(levels)
-        return result
+    def _alone(self, criterion: Determinant, value: float) -> dict[str, tuple[AtOneLevel, ...]]:
+        """Designs at one level of each axis that has several."""
+
+        def at(axis: str, level: float) -> AtOneLevel:
+            rows = np.flatnonzero(self.candidates.points[axis] == level)
+            if not rows.size:
+                return AtOneLevel(level, 0, math.inf)
+            part = criterion.restricted(rows)
+            readings = self.plan.budget / self.cost[rows]
+            n = optimal_weights(part, readings)[0] * readings
+            return AtOneLevel(level, rows.size, times_fewer(part, n, value))
+
+        return {
+            axis: tuple(at(axis, level) for level in levels.tolist())
+            for axis, levels in self.plan.axes.items()
+            if levels.size > 1
+        }
 
     def excluding(self, rival: Objective, simulate: int) -> Design:
         """The design that excludes the rival."""
@@ -466,13 +447,13 @@ class _Task:
             efficiency,
             efficiency * min(best.chi2 / result.chi2_weights, 1.0),
             simulate,
-            (fits, best.u),
+            (fits.to(n), best.u),
             warnings,
             fewer=fewer,
             chi2=best.chi2,
-            chi2_grid=on_grid.chi2,
+            chi2_even_grid=on_grid.chi2,
             probability=probable,
-            probability_grid=probable_on_grid,
+            probability_even_grid=probable_on_grid,
             rival_values=rival.named(best.u),
         )
 
@@ -501,23 +482,26 @@ class _Task:
         efficiency: float,
         whole: float,
         simulate: int,
-        rival: tuple[RivalFit, Float] | None = None,
+        rival: tuple[Objective, Float] | None = None,
         warnings: Sequence[str] = (),
         *,
         fewer: float,
         **numbers: Any,
     ) -> Design:
         """The design of whole readings; `numbers` are further fields of it."""
-        candidates = self.candidates
+        plan, candidates = self.plan, self.candidates
         errors, correlation = self._errors(n.astype(float))
         warnings = [*warnings, *self._warnings(errors, efficiency)]
-        undetermined = any(math.isinf(errors[name].se) for name in self.plan.question.measure)
+        undetermined = any(math.isinf(errors[name].se) for name in plan.question.measure)
         simulation = None
         if simulate:
-            simulation = self._simulated(n.astype(float), simulate, rival)
-            warnings += _deviations_of_simulation(simulation, errors)
+            simulation = simulated(
+                plan, self.expected, n.astype(float), simulate, rival, self.report
+            )
+            expected = {name: error.se for name, error in errors.items()}
+            warnings += deviations_of_simulation(simulation, expected)
         return Design(
-            plan=self.plan,
+            plan=plan,
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
             readings=int(n.sum()),
             spent=float(n @ self.cost),
@@ -587,117 +571,8 @@ class _Task:
             {name: float(v[i]) for name, v in self.candidates.points.items()},
             int(n[i]),
             float(n[i] * self.cost[i]) if self.plan.question.time is not None else None,
-            {k: (float(v[i]), float(readings.errors[k][i])) for k, v in readings.values.items()},
+            {
+                k: PredictedReading(float(v[i]), float(readings.errors[k][i]))
+                for k, v in readings.values.items()
+            },
         )
-
-    def _simulated(self, n: Float, sets: int, rival: tuple[RivalFit, Float] | None) -> Simulated:
-        """Fits of synthetic readings; noise and priors are drawn anew for each set.
-
-        Only the start of each fit is from the linear prediction.
-        """
-        plan, random = self.plan, np.random.default_rng(self.plan.question.seed)
-        counts, readings = n[n > 0], self.expected.without(n <= 0)
-        truth = with_readings(plan, plan.truth, readings, counts)
-        hypotheses = [(truth, truth.coordinates(expected_values(truth)))]
-        if rival is not None:
-            hypotheses.append((rival[0].to(n), rival[1]))
-        estimates, behind = [], []
-        for done in range(sets):
-            self.report(done, sets, "synthetic sets")
-            normal = random.normal(size=(readings.rows, len(OBSERVABLES)))
-            drawn = readings.disturbed(readings.values, normal / np.sqrt(counts)[:, None])
-            errors = {name: known * random.normal() for name, known in plan.priors.items()}
-            fits = [_refitted(h, drawn, errors, counts, begin) for h, begin in hypotheses]
-            ends = [fit for fit in fits if fit is not None]
-            if len(ends) < len(fits):
-                continue
-            estimates.append(list(truth.named(ends[0].u).values()))
-            aicc = [end.aicc for end in ends]
-            behind.append(aicc[-1] - aicc[0] if np.isfinite(aicc).all() else 0.0)
-        columns = np.array(estimates).reshape(-1, len(truth.names)).T
-        spreads = {
-            name: _spread(column, random) for name, column in zip(truth.names, columns, strict=True)
-        }
-        return Simulated(
-            columns.shape[1],
-            sets - columns.shape[1],
-            {name: spread for name, (spread, _) in spreads.items()},
-            {name: error for name, (_, error) in spreads.items()},
-            float((np.array(behind) >= EXCLUDED).mean()) if rival and behind else None,
-        )
-
-
-class _Refit(NamedTuple):
-    """The minimum for synthetic readings, in coordinates, and its AICc up to a constant."""
-
-    u: Float
-    aicc: float
-
-
-def _refitted(
-    objective: Objective,
-    readings: LockInTable,
-    errors: Mapping[str, float],
-    counts: Float,
-    u: Float,
-) -> _Refit | None:
-    """The fit to other readings at the same points; None if no minimum was reached.
-
-    Parameters
-    ----------
-    objective : Objective
-    readings : LockInTable
-    errors : mapping of str to float
-        Errors of the means of priors, in standard deviations.
-    counts : array, shape (rows,)
-    u : array, shape (n,)
-        Start.
-    """
-    (term,) = objective.terms_of(LockInTerm)
-    unknowns = tuple(
-        replace(k, prior=replace(k.prior, mean=k.prior.mean + k.prior.sd * errors[k.name]))
-        if k.prior
-        else k
-        for k in objective.unknowns
-    )
-    term = term.with_table(readings).weighted(np.sqrt(counts))
-    objective = replace(objective, terms=(term,), unknowns=unknowns)
-    end = objective.minimise(u)
-    if not reached(objective, end.u):
-        return None
-    priors, slopes = objective.prior_residuals(end.u)
-    jacobian = objective.residuals(end.u)[1]
-    # As in a fit: priors count neither as data nor, by their leverage, as parameters.
-    parameters = u.size - float(leverages(slopes, jacobian.T @ jacobian).sum())
-    data = float(counts.sum()) * len(readings.observables)
-    return _Refit(end.u, end.chi2 - float(priors @ priors) + aicc_penalty(parameters, data))
-
-
-def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
-    """Half the width of the central 68 %, robust against outliers, and its standard error."""
-    if x.size < 3:
-        return float("nan"), float("nan")
-    copies = np.vstack([x, random.choice(x, size=(200, x.size))])
-    low, high = np.quantile(copies, [0.158655, 0.841345], axis=-1)
-    half = (high - low) / 2
-    return float(half[0]), float(half[1:].std())
-
-
-def _deviations_of_simulation(
-    simulation: Simulated, errors: Mapping[str, ExpectedError]
-) -> list[str]:
-    """Sentences on simulated fits that differ from the expected errors."""
-    warnings = []
-    if simulation.failed:
-        warnings.append(
-            f"{simulation.failed} of {simulation.failed + simulation.sets} simulated fits did not "
-            "converge"
-        )
-    for name, spread in simulation.spread.items():
-        se, error = errors[name].se, simulation.uncertainty[name]
-        if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
-            warnings.append(
-                f"the simulated spread of {named(name)}, {spread:.3g}, is not the expected "
-                f"standard error {se:.3g}: predictions are not linear in it over so wide a range"
-            )
-    return warnings

@@ -126,6 +126,15 @@ def expected_values(hypothesis: Objective) -> dict[str, float]:
     return {u.name: u.middle for u in hypothesis.unknowns}
 
 
+def with_prior_means(hypothesis: Objective, means: Mapping[str, float]) -> Objective:
+    """The hypothesis with other means of its priors, by name; those without a name stay."""
+    unknowns = tuple(
+        replace(u, prior=replace(u.prior, mean=means.get(u.name, u.prior.mean))) if u.prior else u
+        for u in hypothesis.unknowns
+    )
+    return replace(hypothesis, unknowns=unknowns)
+
+
 @typed
 def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
     """Read a plan from a TOML file; quantities carry their unit.
@@ -202,7 +211,9 @@ def _checked(question: Design, name: str) -> DesignPlan:
     noise = _noise(question)
     uncertainty = _uncertainties(question, known, material, truth)
     expected = {**truth.fixed, **expected_values(truth)}
-    truth, rival = (h and _with_expected_priors(h, expected) for h in (truth, rival))
+    # A prior is another measurement of the interface that the readings are of.
+    truth = with_prior_means(truth, expected)
+    rival = None if rival is None else with_prior_means(rival, expected)
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
     require_motion(truth.names, plan.motion)
     for label in ("values", "fixed", "ranges"):
@@ -353,21 +364,6 @@ def _hypothesis(
     unknowns = unknowns_of(law, free, largest_epsilon=largest, start=start, priors=priors)
     constants = {n: float(v) for n, v in constants.items() if n not in table.points}
     return Objective((), law, unknowns, constants)
-
-
-def _with_expected_priors(hypothesis: Objective, expected: Mapping[str, float]) -> Objective:
-    """The hypothesis with the means of its priors at the values that the readings follow.
-
-    A prior is another measurement of the same interface. A mean of a parameter that only a rival
-    has stays as it is.
-    """
-    unknowns = tuple(
-        replace(u, prior=replace(u.prior, mean=expected.get(u.name, u.prior.mean)))
-        if u.prior
-        else u
-        for u in hypothesis.unknowns
-    )
-    return replace(hypothesis, unknowns=unknowns)
 
 
 def _uncertainties(
