@@ -23,14 +23,9 @@ from asperity.inference.design.candidates import (
     predicted,
     some_of,
 )
-from asperity.inference.design.criteria import Determinant, Misfit
+from asperity.inference.design.criteria import Determinant
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
-from asperity.inference.design.rival import (
-    RivalFit,
-    prior_rows,
-    probability_of_deciding,
-    separation,
-)
+from asperity.inference.design.rival import RivalFit, separation
 from asperity.inference.design.simulation import (
     Simulated,
     deviations_of_simulation,
@@ -413,19 +408,9 @@ class _Task:
             got, advice = f"'{name}', which gives the same with {values}", "exchange the two laws"
             raise InputError(field, rule, got, f"{advice}, or fix some of its parameters")
         on_grid = fits.fitted(grid, best.u)
-        u = plan.truth.coordinates(expected_values(plan.truth))
-        law = Misfit(
-            np.zeros(self.jacobian.shape[:2]), self.jacobian, *prior_rows(plan, plan.truth, u)
-        )
-        drawn = list(plan.priors.values())
         probable, probable_on_grid = (
-            probability_of_deciding(law, linear, readings, plan.question.seed, drawn)
-            if fits.reached(readings, end)
-            else None
-            for readings, end, linear in (
-                (n, best, result.criterion),
-                (grid, on_grid, fits.criterion(on_grid.u, grid)[0]),
-            )
+            fits.probability_of_deciding(self.jacobian, m, end)
+            for m, end in ((n, best), (grid, on_grid))
         )
         warnings = [
             f"the fit of {name} to {where} ended next to values with which it has no response: "

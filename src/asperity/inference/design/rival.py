@@ -50,8 +50,6 @@ class Separation(NamedTuple):
         The rival refitted to the expected whole readings.
     chi2_weights : float
         Chi-squared of the rival refitted to the design weights.
-    criterion : Misfit
-        Criterion at the fit `fitted`.
     unseen : int
         Number of candidates that were left out because the rival has no response at its last fit.
     """
@@ -60,7 +58,6 @@ class Separation(NamedTuple):
     readings: Whole
     fitted: Minimum
     chi2_weights: float
-    criterion: Misfit
     unseen: int
 
 
@@ -114,6 +111,26 @@ class RivalFit:
         moving = ~self.rival.active_bounds(u, slope)
         return Misfit(residual, jacobian * moving, prior, prior_slopes * moving), at.seen
 
+    def probability_of_deciding(self, jacobian: Float, n: Float, end: Minimum) -> float | None:
+        """Probability that n readings exclude the rival; None if its fit reached no minimum.
+
+        Parameters
+        ----------
+        jacobian : array, shape (candidates, m, p)
+            Jacobian of the true law, in standard uncertainties of a reading.
+        n : array, shape (candidates,)
+        end : Minimum
+            Fit of the rival to the expected readings.
+        """
+        if not self.reached(n, end):
+            return None
+        plan, truth = self.plan, self.plan.truth
+        priors = prior_rows(plan, truth, truth.coordinates(expected_values(truth)))
+        law = Misfit(np.zeros(jacobian.shape[:2]), jacobian, *priors)
+        rival, _ = self.criterion(end.u, n)
+        drawn = list(plan.priors.values())
+        return probability_of_deciding(law, rival, n, plan.question.seed, drawn)
+
 
 def separation(
     fits: RivalFit, cost: Float, total: float, progress: Callable[[int, int, str], None]
@@ -159,8 +176,8 @@ def separation(
         if not fitted.chi2 * (1 + 1e-6) < again.chi2 < np.inf:
             break
         n, fitted = changed, again
-    last, seen = fits.criterion(fitted.u, n.astype(float))
-    return Separation(efficiency, n, fitted, best.chi2, last, int((~seen).sum()))
+    seen = fits.criterion(fitted.u, n.astype(float))[1]
+    return Separation(efficiency, n, fitted, best.chi2, int((~seen).sum()))
 
 
 def reached(objective: Objective, u: Float) -> bool:
