@@ -153,7 +153,7 @@ def test_plans_of_sweeps_on_pages_are_valid(workplace) -> None:
         for axis in whole["axes"].values():
             taken |= {*axis.get("zip", {}), *axis.get("over", {})}
         if part.get("solve") == "transient":  # no step of the page modulates the load
-            taken.add("epsilon")
+            taken |= {"epsilon", "frequency"}
         plan = whole | {"parameters": {n: v for n, v in numbers.items() if n not in taken}}
         assert set(plan_record(SweepPlan(**plan))["axes"]) == set(whole["axes"])
 
