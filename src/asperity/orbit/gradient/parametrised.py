@@ -154,7 +154,8 @@ class ParametrisedProblem:
 @cache
 def _numbers_of(equations: ParametrisedProblem) -> tuple[Any, list[tuple[str, float]]]:
     """Structure of a problem, and each of its numbers as a parameter and its constant factor."""
-    one, numbers = dict.fromkeys(equations.names, 1.0), {}
+    one = dict.fromkeys(equations.names, 1.0)
+    numbers: dict[int, tuple[str, float]] = {}
     with jax.ensure_compile_time_eval():  # also where a program that needs it is traced
         leaves, structure = jax.tree.flatten(equations._built(one))
         _, push = jax.linearize(equations._built, one)
