@@ -22,7 +22,6 @@ from asperity.orbit.outcome import WITHOUT_ORBIT
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial
 from asperity.slider.inertial import StiffInertial
-from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.inputs import checked_integration, first_checkpoint
@@ -148,8 +147,10 @@ def _on_mesh(problem: Problem, period: DenseOutput) -> Orbit:
     stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
     nodes = period.evaluate(mesh[:-1])
     inner = period.evaluate(stages.ravel()).reshape(len(nodes), *stages.shape)
-    at = excitation_at(problem.load, stages[..., None])
-    values = values_at(problem.system, at, np.zeros_like(nodes[:, :1]), inner[..., None])
+    # Slopes with which the states at the collocation points are those of the transient; the rates
+    # of a stiff equation at these states have large errors.
+    slopes = np.einsum("jk,nkm->njm", np.linalg.inv(scheme.a), inner - nodes[:, None])
+    slopes /= np.diff(mesh)
     return Orbit(
-        mesh[:, None], nodes[:, :1], (nodes - nodes[:, :1])[..., None], values.rates, scheme
+        mesh[:, None], nodes[:, :1], (nodes - nodes[:, :1])[..., None], slopes[..., None], scheme
     )
