@@ -28,6 +28,7 @@ from asperity.orbit.methods.frequency_path import FrequencyPath
 from asperity.orbit.methods.from_transient import SettledMotion
 from asperity.orbit.methods.series import FourierSeries
 from asperity.orbit.methods.shooting import Shooting
+from asperity.orbit.methods.stroboscopic import StroboscopicMap
 from asperity.orbit.outcome import (
     LARGEST_GROWTH,
     LARGEST_RATE,
@@ -72,6 +73,7 @@ METHODS: tuple[Method, ...] = (
     Shooting(),
     FourierSeries(),
     Collocation(),
+    StroboscopicMap(),
     SettledMotion(),
     BranchFollowing(),
     FrequencyPath(),

@@ -40,7 +40,7 @@ from asperity.transients.dense_output import DenseOutput
 from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
-from asperity.transients.variation import variations
+from asperity.transients.variation import stage_times, variations
 
 #: Velocities of sliding before the first cycle, over that of the drive. The second is used where
 #: the first slip after the slower sliding is too large for the law.
@@ -276,9 +276,11 @@ class _Orbit:
         motion = run.parts[0].system.motion
         names = tuple(equation_parameters(motion))
         first, last = run.states(np.array([begin, end]))[:-1].T
-        ends, slopes = variations(
-            motion, lambda t: run.states(t)[:-1], run.nodes(begin, end), names
-        )
+        nodes = run.nodes(begin, end)
+        steps = nodes[:-1], np.diff(nodes)
+        times = stage_times(*steps)
+        states = run.states(times.ravel())[:-1].reshape(-1, *times.shape)
+        ends, slopes = variations(motion, *steps, states, names)
         rates, gradient = (np.asarray(a) for a in _rates_and_gradient(motion, last))
         later = gradient @ ends / (gradient @ rates)
         return cls(

@@ -16,12 +16,11 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -39,22 +38,36 @@ from asperity.transients.implicit import STAGES
 #: Fewest instants in a call of the compiled program; more are padded to a power of two.
 _FEWEST = 1024
 
+_CONSTANT = Excitation(np.ones(()))
+
+
+def stage_times(begin: Float, length: Float) -> Float:
+    """Times of the collocation points of steps, shape (steps, stages)."""
+    return begin[:, None] + length[:, None] * radau_iia(STAGES).c
+
 
 def variations(
-    motion: Motion, states: Callable[[Float], Float], nodes: Float, names: Sequence[str]
+    motion: Motion,
+    begin: Float,
+    length: Float,
+    states: Float,
+    names: Sequence[str] = (),
+    at: Excitation = _CONSTANT,
 ) -> tuple[Float, DenseOutput]:
-    """Derivatives of the states along a motion under constant load and drive.
+    """Derivatives of the states along a motion.
 
     Parameters
     ----------
     motion : Motion
         With scalar parameters and omega = 1 rad/s.
-    states : callable
-        States of shape (size, n) at times (s) of shape (n,).
-    nodes : array, shape (steps + 1,)
-        Times of the steps; the derivatives refer to the beginning of the first step.
+    begin, length : array, shape (steps,)
+        Of the steps (s); the derivatives refer to the beginning of the first step.
+    states : array, shape (size, steps, stages)
+        States at `stage_times`.
     names : sequence of str
         Parameters of the law or the machine, in SI.
+    at : Excitation
+        Numbers, or arrays at `stage_times`; constant load and drive by default.
 
     Returns
     -------
@@ -64,41 +77,48 @@ def variations(
     of_first_state : DenseOutput
         The first row of such arrays at all times. With a mass the first state is F/W0.
     """
-    scheme, size = radau_iia(STAGES), motion.size
-    lengths = np.diff(nodes)
-    times = nodes[:-1, None] + lengths[:, None] * scheme.c
-    jacobian, sides = _linearised(motion, names, states(times.ravel()))
+    scheme, size, shape = radau_iia(STAGES), motion.size, states.shape[1:]
+    jacobian, sides = _linearised(motion, names, at, states)
     # (steps, stages, size, size) and (steps, stages, size, size + parameters)
-    jacobian = jacobian.reshape(size, size, *times.shape).transpose(2, 3, 0, 1)
-    sides = sides.reshape(len(names), size, *times.shape).transpose(2, 3, 1, 0)
+    jacobian = jacobian.reshape(size, size, *shape).transpose(2, 3, 0, 1)
+    sides = sides.reshape(len(names), size, *shape).transpose(2, 3, 1, 0)
     sides = np.concatenate([jacobian, sides], axis=3)
-    weights = lengths[:, None, None] * scheme.a
+    weights = length[:, None, None] * scheme.a
     unknowns = STAGES * size
     matrix = np.eye(unknowns) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
         -1, unknowns, unknowns
     )
-    known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), unknowns, -1)
-    stages = np.linalg.solve(matrix, known).reshape(len(lengths), STAGES, size, -1)
+    known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(length), unknowns, -1)
+    stages = np.linalg.solve(matrix, known).reshape(len(length), STAGES, size, -1)
     # Changes over each step by power of time: for unit derivatives at its beginning, and the
     # contribution of the parameters.
     powers = np.einsum("kj,njrc->knrc", scheme.monomials / scheme.c, stages)
     derivatives = np.eye(size, size + len(names))
-    first = np.empty((STAGES + 1, size + len(names), len(lengths)))
-    for i in range(len(lengths)):
+    first = np.empty((STAGES + 1, size + len(names), len(length)))
+    for i in range(len(length)):
         changes = powers[:, i, :, :size] @ derivatives
         changes[..., size:] += powers[:, i, :, size:]
         first[0, :, i], first[1:, :, i] = derivatives[0], changes[:, 0]
         derivatives = derivatives + changes.sum(0)
-    return derivatives, DenseOutput(nodes[:-1], lengths, first)
+    return derivatives, DenseOutput(begin, length, first)
 
 
-def _linearised(motion: Motion, names: Sequence[str], Y: Float) -> tuple[Float, Float]:
+def _linearised(
+    motion: Motion, names: Sequence[str], at: Excitation, Y: Float
+) -> tuple[Float, Float]:
     """Derivatives of the rates by states (size, size, n) and parameters (parameters, size, n)."""
-    count = Y.shape[1]
+    size, count = len(Y), Y[0].size
     padded = max(_FEWEST, 1 << (count - 1).bit_length())
-    Y = np.concatenate([Y, np.repeat(Y[:, -1:], padded - count, axis=1)], axis=1)
-    jacobian, sides = _slopes(motion, _directions(jax.tree.structure(motion), tuple(names)), Y)
-    return np.asarray(jacobian)[:, :, :count], np.stack(sides)[:, :, :count]
+    filled = np.minimum(np.arange(padded), count - 1)
+
+    def flat(a: Any) -> Float:
+        return np.broadcast_to(a, Y.shape[1:]).ravel()[filled]
+
+    directions = _directions(jax.tree.structure(motion), tuple(names))
+    rows = Y.reshape(size, count)[:, filled]
+    jacobian, sides = _slopes(motion, directions, Excitation(*map(flat, at)), rows)
+    sides = np.reshape(sides, (len(names), size, padded))
+    return np.asarray(jacobian)[:, :, :count], sides[:, :, :count]
 
 
 @cache
@@ -110,8 +130,9 @@ def _directions(structure: Any, names: tuple[str, ...]) -> list[Any]:
 
 
 @jit_large
-def _slopes(motion: Motion, directions: list[Any], Y: Array) -> tuple[Array, list[Array]]:
-    at = Excitation(jnp.ones(Y.shape[1:]))
+def _slopes(
+    motion: Motion, directions: list[Any], at: Excitation, Y: Array
+) -> tuple[Array, list[Array]]:
     _, jacobian = value_and_jacobian(lambda Y: motion.rates(Y, at), Y)
     sides = [jax.jvp(lambda m: m.rates(Y, at), (motion,), (d,))[1] for d in directions]
     return jacobian, sides

@@ -3,14 +3,37 @@
 import numpy as np
 
 import asperity as asp
+from asperity.loads import Modulate, Programme
 from asperity.orbit.methods.from_transient import settled_orbits
 from asperity.slider.problem import checked_problem, flatten
 
 A, B, D0, V0, MU0, W0 = 0.013, 0.026, 4e-7, 1e-6, 0.5, 7.0
-V, FREQUENCY, K, M = 1.5e-6, 1.775, 9.9e5, 147.0
+V, EPSILON, FREQUENCY, K, M = 1.5e-6, 0.83, 1.775, 9.9e5, 147.0
+PERIODS, SAMPLES = 14, 64
 
 LAW = asp.laws.RiceRuina(mu0=MU0, A=A, B=B, D0=D0, V0=V0)
 SLIDER = asp.Slider(LAW, spring=K, load=W0, mass=M)
+
+
+def test_a_slider_that_stops_once_a_period_has_the_orbit_to_which_a_transient_settles():
+    response = asp.periodic_response(
+        SLIDER, velocity=V, epsilon=EPSILON, frequency=FREQUENCY, inertia=True, waveform=SAMPLES
+    )
+    assert response.result[()] == "converged"
+    force, log_v = response.waveform
+    assert np.ptp(log_v) > 30
+    period = 1 / FREQUENCY
+    modulation = Modulate((PERIODS + 3) * period, EPSILON, FREQUENCY, rise=2 * period)
+    times = (2 + np.arange(PERIODS * SAMPLES + 1) / SAMPLES) * period
+    programme = Programme(modulation, load=W0, velocity=V)
+    motion = asp.transient(SLIDER, programme, inertia=True, sampling=times)
+    marched = (motion.force / W0)[:-1].reshape(PERIODS, SAMPLES)
+    # The distance to the orbit, at theta = 0 and in each period, changes by the multiplier.
+    change = np.diff(marched[-7:, 0])
+    multiplier = (change[1:] @ change[:-1]) / (change[:-1] @ change[:-1])
+    assert abs(multiplier / response.multipliers[0].real - 1) < 1e-3
+    left = multiplier * (marched[-1] - marched[-2]) / (1 - multiplier)
+    np.testing.assert_allclose(force, marched[-1] + left, rtol=0, atol=1e-7)
 
 
 def test_the_states_of_a_stiff_initial_guess_are_those_of_the_transient():

@@ -1,0 +1,217 @@
+"""Newton's method on the stroboscopic map, the motion over one period, by the implicit integrator.
+
+With inertia on rigid asperities a slider stops within 10^-8 of the period, and ln v falls by dozens
+of units there. On a mesh the instant of the stop moves by about one interval in each step of
+Newton's method, because the linearised equations of intervals that stick forget the velocity before
+them. The integrator finds the instant of the stop by its step size, and the states after a period
+depend smoothly on those before. The initial guess is the end of a transient from steady sliding.
+
+A tighter integration checks the orbit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jax import Array
+
+from asperity.algebra.runge_kutta import gauss_legendre, radau_iia
+from asperity.arrays import Float
+from asperity.loads import CyclicLoading, Excitation, Programme
+from asperity.orbit.batches import take
+from asperity.orbit.floquet import AGREEMENT, multiplier_gap
+from asperity.orbit.observables import Observables, response_gap, waveform_of
+from asperity.orbit.solution import Method, SearchOptions, Solution
+from asperity.slider.inertial import StiffInertial
+from asperity.slider.problem import Problem
+from asperity.theory.limits import even_phases
+from asperity.transients.dense_output import DenseOutput
+from asperity.transients.equations import SegmentEquations
+from asperity.transients.implicit import STAGES
+from asperity.transients.inputs import checked_integration, first_checkpoint
+from asperity.transients.integration import Checkpoint, Integration
+from asperity.transients.variation import stage_times, variations
+
+#: Shares of the modulation in the first periods of a transient, since a sudden start may throw the
+#: slider back; number of periods after these; tolerance; and most steps of an integration.
+_SHARES, _PERIODS, _ROUGH, _MOST_STEPS = (0.25, 0.5, 0.75), 12, 1e-6, 100_000
+#: Tolerances of two integrations that are compared; the error of the second is a hundredth of their
+#: difference or less.
+_TOLERANCES = (1e-8, 1e-11)
+#: Periods integrated for each tolerance; largest change of a logarithm in a Newton step; and change
+#: of a state over the period, in tolerances, at which an orbit is closed.
+_PASSES, _LARGEST_CHANGE, _CLOSED = 20, 2.0, 10.0
+#: Points of the quadrature in each step of the integrator, whose dense output is of degree 5.
+_QUADRATURE = gauss_legendre(8)
+
+
+class StroboscopicMap(Method):
+    """Newton's method on the states at theta = 0; the integrator chooses the steps."""
+
+    name = "stroboscopic map"
+    choice = "collocation"
+    on_mesh = False
+
+    def suits(self, problem: Problem) -> bool:
+        """With inertia on rigid asperities, where an orbit may stop and start again."""
+        return isinstance(problem.system, StiffInertial)
+
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """As in `Method`."""
+        solution = Solution.unsolved(problem, options)
+        for i in range(len(solution.outcome)):
+            row = np.array([i])
+            point = take(problem, row)
+            orbit, gap = _orbit(jax.tree.map(lambda a: a.item(), point), options.harmonics)
+            if orbit is not None:
+                solution.store(row, orbit.observables)
+                solution.detail[row] = gap
+                solution.iterations[row] = len(orbit.period.begin)
+                if options.phases:
+                    theta = even_phases(options.phases)
+                    Y = orbit.period.evaluate(theta[:, 0] / point.system.omega)[:-1, :, None]
+                    solution.waveform[..., row] = waveform_of(point, Y, theta)
+                options.progress(1)
+        return solution
+
+
+class _ClosedOrbit(NamedTuple):
+    """An orbit, and its steps over the period in seconds."""
+
+    observables: Observables
+    period: DenseOutput
+
+
+def _orbit(point: Problem, harmonics: int) -> tuple[_ClosedOrbit | None, float]:
+    """The orbit that the motion from steady sliding reaches, and the difference of tolerances.
+
+    None without an orbit, or if the difference is too large.
+    """
+    Y, orbits = _settled_states(point), list[_ClosedOrbit]()
+    for rtol in _TOLERANCES:
+        orbit = None if Y is None else _closed(point, Y, rtol, harmonics)
+        if orbit is None:
+            return None, np.inf
+        Y = orbit.observables.start[:, 0]
+        orbits.append(orbit)
+    first, second = (orbit.observables for orbit in orbits)
+    of_response = response_gap(first.numbers, second.numbers)
+    of_multipliers = multiplier_gap(first.log_multipliers, second.log_multipliers)
+    gap = float(max(of_response[0], of_multipliers[0]))
+    return (orbits[-1] if gap <= AGREEMENT else None), gap
+
+
+def _integration(point: Problem, steps: list[tuple[Any, float]], rtol: float) -> Integration:
+    """Integration of modulations, each over a number of periods, in ln v."""
+    system, period = point.system, 2 * np.pi / point.system.omega
+    cycles = (CyclicLoading(count * period, load, 1 / period) for load, count in steps)
+    integration = checked_integration(
+        system.slider,
+        Programme(*cycles, load=system.slider.W0, velocity=system.V),
+        inertia=True,
+        radiation_damping=system.eta or None,
+        rtol=rtol,
+        method="implicit",
+        most_steps=_MOST_STEPS,
+    )
+    motion = StiffInertial(
+        integration.motion.slider, integration.motion.V, integration.motion.omega, system.eta
+    )
+    return replace(integration, motion=motion)
+
+
+def _integrated(integration: Integration) -> tuple[SegmentEquations, DenseOutput] | None:
+    """The steps of the last segment; None if the motion ends before."""
+    steps = []
+    for part in integration.segment_parts():
+        if part.termination is not None:
+            return None
+        if part.checkpoint.segment == len(integration.programme.segments) - 1:
+            steps.append(part.dense_output)
+    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*steps, strict=True)))
+    return part.system, whole
+
+
+def _settled_states(point: Problem) -> Float | None:
+    """States after some periods from steady sliding."""
+    rise = [(point.load.scaled(share), 1) for share in _SHARES]
+    integration = _integration(point, [*rise, (point.load, _PERIODS)], _ROUGH)
+    integration.checkpoint = first_checkpoint(integration.motion, integration.programme, "steady")
+    run = _integrated(integration)
+    return None if run is None else _last_states(run[1])
+
+
+def _last_states(steps: DenseOutput) -> Float:
+    """States at the end, without the displacement."""
+    return np.asarray(steps.coefficients[:, :-1, -1].sum(0))
+
+
+def _closed(point: Problem, Y: Float, rtol: float, harmonics: int) -> _ClosedOrbit | None:
+    """The orbit near states at theta = 0; where Newton's method fails, the motion goes on."""
+    marched = None
+    for _ in range(_PASSES):
+        integration = _integration(point, [(point.load, 1)], rtol)
+        integration.checkpoint = Checkpoint(0, 0.0, np.append(Y, 0.0))
+        run = _integrated(integration)
+        if run is None:
+            if marched is None:
+                return None
+            Y, marched = marched, None
+            continue
+        marched, monodromy = _last_states(run[1]), _monodromy(*run)
+        if np.abs(marched - Y).max() < _CLOSED * rtol:
+            return _ClosedOrbit(_observables(Y, *run, monodromy, harmonics), run[1])
+        try:
+            step = np.linalg.solve(np.eye(len(Y)) - monodromy, marched - Y)
+        except np.linalg.LinAlgError:
+            return None
+        largest = np.abs(step[integration.motion.logarithms]).max()
+        Y = Y + step * min(1.0, _LARGEST_CHANGE / largest)
+    return None
+
+
+def _at_shares(steps: DenseOutput, shares: Float) -> Float:
+    """States at the same shares of all steps, (size, steps, shares).
+
+    Where a slider stops, steps are shorter than the spacing of doubles at the time.
+    """
+    powers = shares ** np.arange(len(steps.coefficients))[:, None]
+    return np.einsum("kns,kc->nsc", steps.coefficients[:, :-1], powers)
+
+
+def _monodromy(system: SegmentEquations, steps: DenseOutput) -> Float:
+    """Derivatives of the states at the end by those at the beginning."""
+    states = _at_shares(steps, radau_iia(STAGES).c)
+    at = _excitation(system, stage_times(steps.begin, steps.length))
+    return variations(system.motion, steps.begin, steps.length, states, at=at)[0]
+
+
+@jax.jit
+def _excitation(system: SegmentEquations, t: Array) -> Excitation:
+    return system.at(t)
+
+
+def _observables(
+    start: Float, system: SegmentEquations, steps: DenseOutput, monodromy: Float, harmonics: int
+) -> Observables:
+    """Observables of an orbit, by quadrature over each step; one point."""
+    scheme, omega = _QUADRATURE, 2 * np.pi / steps.end
+    phases = omega * (steps.begin[:, None] + steps.length[:, None] * scheme.c)
+    weights = steps.length[:, None] / steps.end * scheme.b
+    # The first state is F/W0.
+    force = _at_shares(steps, scheme.c)[0] - start[0]
+    turns = np.exp(-1j * np.arange(1, harmonics + 1)[:, None, None] * phases)
+    none = np.zeros(1)
+    return Observables(
+        start[:1] + (weights * force).sum(),
+        2 * (turns * weights * force).sum((1, 2))[:, None],
+        monodromy[..., None],
+        none,
+        np.linalg.slogdet(monodromy)[1] + none,
+        np.full((*monodromy.shape, 1), np.nan),
+        none,
+        start[:, None],
+    )
