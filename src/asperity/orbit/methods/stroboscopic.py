@@ -40,7 +40,7 @@ from asperity.transients.variation import stage_times, variations
 _SHARES, _PERIODS, _ROUGH, _MOST_STEPS = (0.25, 0.5, 0.75), 12, 1e-6, 100_000
 #: Tolerances of two integrations that are compared; the error of the second is a hundredth of their
 #: difference or less.
-_TOLERANCES = (1e-8, 1e-11)
+_TOLERANCES = (1e-10, 1e-12)
 #: Periods integrated for each tolerance; largest change of a logarithm in a Newton step; and change
 #: of a state over the period, in tolerances, at which an orbit is closed.
 _PASSES, _LARGEST_CHANGE, _CLOSED = 20, 2.0, 10.0
