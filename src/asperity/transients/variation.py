@@ -117,8 +117,8 @@ def _linearised(
     directions = _directions(jax.tree.structure(motion), tuple(names))
     rows = Y.reshape(size, count)[:, filled]
     jacobian, sides = _slopes(motion, directions, Excitation(*map(flat, at)), rows)
-    sides = np.reshape(sides, (len(names), size, padded))
-    return np.asarray(jacobian)[:, :, :count], sides[:, :, :count]
+    by_parameter = np.reshape(sides, (len(names), size, padded))
+    return np.asarray(jacobian)[:, :, :count], by_parameter[:, :, :count]
 
 
 @cache

@@ -95,7 +95,7 @@ def _orbit(point: Problem, harmonics: int) -> tuple[_ClosedOrbit | None, float]:
         orbit = None if Y is None else _closed(point, Y, rtol, harmonics)
         if orbit is None:
             return None, np.inf
-        Y = orbit.observables.start[:, 0]
+        Y = np.asarray(orbit.observables.start[:, 0])
         orbits.append(orbit)
     first, second = (orbit.observables for orbit in orbits)
     of_response = response_gap(first.numbers, second.numbers)
