@@ -87,6 +87,11 @@ class Fails(Skewed):
         return Skewed(self.b)
 
 
+class Branches(Skewed):
+    def at(self, theta):
+        return super().at(theta) if self.a > 0.3 else Excitation(jnp.ones_like(theta))
+
+
 class OfPullOnly(Skewed):
     def at(self, theta):
         return Excitation(w=1.0, pull=super().at(theta).w)
@@ -103,6 +108,7 @@ class OfPullOnly(Skewed):
         (NoShearSlope, "shear_slope as the derivative of shear"),
         (OtherAmplitude, "that of the first harmonic of W/W0, 0.535898, got 0.5"),
         (Fails, r"work on arrays of jax.numpy, got AttributeError .*'b'"),
+        (Branches, "work on arrays of jax.numpy, got TracerBoolConversionError"),
         (NotScaled, r"scaled\(0\) must be a constant load"),
     ],
 )

@@ -6,6 +6,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.typing import ArrayLike
 
 from asperity.arrays import Float
 from asperity.errors import InputError, code_of_others, require
@@ -87,12 +88,12 @@ def _check(
 def _check_samples(modulation: Modulation, samples: int, name: str) -> None:
     """Raise `InputError` for the first faulty point."""
     theta = 2 * np.pi * np.arange(samples) / samples
-    at = modulation.at(theta[:, None])
-    amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))
+    at, amplitude, still = jax.tree.map(np.asarray, _members(modulation, theta[:, None]))
+    amplitude = np.atleast_1d(amplitude)
     rule, got = "give w an entry for each phase", f"an array of shape {np.shape(at.w)}"
     require(np.shape(at.w)[:1] == (samples,), f"{name}.at", rule, got, "fill an array")
     values = {
-        field: np.asarray(value, float) * np.ones((samples, amplitude.size))
+        field: value * np.ones((samples, amplitude.size))
         for field, value in zip(Excitation._fields, at, strict=True)
     }
     member = f"{name}.at"
@@ -118,10 +119,15 @@ def _check_samples(modulation: Modulation, samples: int, name: str) -> None:
     got, advice = f"{amplitude[wrong]:.6g}", "correct one of the two"
     holds = abs(amplitude[wrong] - first[wrong]) <= _MEAN
     require(holds, f"{name}.amplitude", rule, got, advice)
-    still = np.asarray(modulation.scaled(0.0).at(theta[:, None]).w)
     rule, got = "be a constant load, W/W0 = 1", "one that changes"
     holds, advice = np.abs(still - 1).max() <= _MEAN, "multiply the strength by the share"
     require(holds, f"{name}.scaled(0)", rule, got, advice)
+
+
+@jax.jit
+def _members(modulation: Modulation, theta: Float) -> tuple[Excitation, ArrayLike, ArrayLike]:
+    """Excitation, amplitude, and W/W0 of steady sliding, from one compiled program."""
+    return modulation.at(theta), modulation.amplitude, modulation.scaled(0.0).at(theta).w
 
 
 def _missed_by_slope(values: Float, slopes: Float) -> float:

@@ -146,22 +146,31 @@ def _mu_ss(law: Law, V: ArrayLike) -> Array:
 
 def _proportional(problem: Problem, points: int, options: SearchOptions) -> Solution:
     """A law without rate dependence: the force follows load and shear force, without dynamics."""
-    (system, load), (harmonics, phases, *_) = problem, options
-    count = max(phases, 4 * harmonics + 2 * _harmonics_of(load))
-
-    def force(samples: int) -> np.ndarray:
-        theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
-        at, law = load.at(theta), system.slider.law
-        friction = law.friction(system.V, law.steady_state(system.V), at.w)
-        return np.asarray(at.w * friction - at.shear)
-
-    spectrum = np.fft.rfft(force(count), axis=0) / count
+    harmonics, phases, *_ = options
+    count = max(phases, 4 * harmonics + 2 * _harmonics_of(problem.load))
+    spectrum = np.fft.rfft(_force(problem, count), axis=0) / count
     solution = Solution.empty(0, points, options)
     solution.mean_friction[:] = spectrum[0].real
     solution.harmonics[:] = 2 * spectrum[1 : harmonics + 1]
-    solution.waveform[:] = np.stack([force(phases), np.zeros((phases, points))])
+    if phases:
+        solution.waveform[0] = _force(problem, phases)
+    solution.waveform[1] = 0.0
     solution.outcome[:] = Outcome.CONVERGED
     return solution
+
+
+def _force(problem: Problem, samples: int) -> np.ndarray:
+    """Force over W0 at evenly spaced phases, shape (samples, points)."""
+    theta = 2 * np.pi * np.arange(samples)[:, None] / samples
+    return np.asarray(_following_force(problem, theta))
+
+
+@jax.jit
+def _following_force(problem: Problem, theta: ArrayLike) -> Array:
+    system, load = problem
+    at, law = load.at(theta), system.slider.law
+    friction = law.friction(system.V, law.steady_state(system.V), at.w)
+    return at.w * friction - at.shear
 
 
 #: Harmonics that a user's own load is taken to have.
