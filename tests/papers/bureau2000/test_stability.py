@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from asperity_papers.bureau2000 import stability
-from asperity_papers.bureau2000.machine import Machine
 
 SEGMENTS = 16
 
@@ -75,7 +74,17 @@ def test_unmodulated_sliding_grows_by_its_eigenvalue(figure, reference, variant,
     assert first["floquet_max"] == pytest.approx(np.exp(growth / 120), rel=1e-10)
 
 
-def test_a_threshold_outside_its_bracket_is_nan():
-    V = np.array([1e-6])
-    epsilon = stability.thresholds(Machine(), "RR", V, (np.array([0.02]), np.array([0.05])))
-    assert np.isnan(epsilon).all()
+@pytest.mark.parametrize(("gap", "known"), [([], True), ([60], True), ([44], False), ([45], False)])
+def test_a_threshold_next_to_a_point_that_failed_is_nan(figure, gap, known):
+    rows = figure.curve("RR, 1 um/s").reset_index(drop=True)
+    rows.loc[gap, "converged"], rows.loc[gap, "floquet_max"] = False, np.nan
+    threshold = figure.scalars["threshold RR, 1 um/s"]
+    assert rows["epsilon_eff"][44] < threshold < rows["epsilon_eff"][45]
+    expected = threshold if known else np.nan
+    assert stability.fall_below_one(rows) == pytest.approx(expected, rel=1e-9, nan_ok=True)
+
+
+def test_a_curve_that_does_not_become_stable_has_no_threshold(figure):
+    assert np.isnan(stability.fall_below_one(figure.curve("RR, 1 um/s")[:40]))
+    assert np.isnan(stability.fall_below_one(figure.curve("RR, 1 um/s")[50:]))
+    assert np.isnan(stability.fall_below_one(figure.curve("RR, 1 um/s").assign(floquet_max=np.nan)))
