@@ -14,8 +14,8 @@ from asperity.arrays import Float
 class Outcome(IntEnum):
     """Outcome of a periodic solve.
 
-    FOLDED, RUNAWAY, RESTS and SENSITIVE are results, not failures of a method: the branch of
-    orbits that begins with steady sliding does not reach the requested amplitude, or reaches it
+    FOLDED, RUNAWAY, RESTS, REVERSES and SENSITIVE are results, not failures of a method: the branch
+    of orbits that begins with steady sliding does not reach the requested amplitude, or reaches it
     only through orbits that no computation and no experiment could stay on. Orbits that are not
     connected to steady sliding may exist. OUT_OF_RANGE is given without a search.
     """
@@ -30,6 +30,7 @@ class Outcome(IntEnum):
     INVALID = 7
     OUT_OF_RANGE = 8
     RESTS = 9
+    REVERSES = 10
 
 
 #: Smallest and largest rate of a disturbance of steady sliding, per radian of the modulation, at
@@ -49,6 +50,7 @@ WITHOUT_ORBIT = (
     Outcome.RUNAWAY,
     Outcome.SENSITIVE,
     Outcome.RESTS,
+    Outcome.REVERSES,
 )
 
 _SENTENCES = {
@@ -85,6 +87,12 @@ _SENTENCES = {
         "{detail:.3g} on, where its velocity has no logarithm: inertia without elastic asperities "
         "takes it as a state; lower epsilon, leave inertia out, or take a law that is smooth at "
         "rest, such as 'regularised', whose motion asperity.transient follows through rest"
+    ),
+    Outcome.REVERSES: (
+        "on the branch from steady sliding the interface force vanishes once a period from epsilon "
+        "= {detail:.3g} on, and slip would reverse, for which this law is not defined; lower "
+        "epsilon, leave inertia out, or take a law that is smooth at rest, such as 'regularised', "
+        "whose motion asperity.transient follows through rest"
     ),
     Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }

@@ -319,8 +319,12 @@ class BranchFollowing(Method):
         self.meshes = meshes
 
     def candidates(self, solution: Solution) -> Index:
-        """Points without an orbit, or whose orbit was lost on every finer mesh."""
-        return np.flatnonzero(_without_orbit(solution))
+        """Points without an orbit, or whose orbit was lost on every finer mesh.
+
+        Where the interface force vanishes on the branch, its end is known.
+        """
+        known = solution.outcome == Outcome.REVERSES
+        return np.flatnonzero(_without_orbit(solution) & ~known)
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; `detail` is the amplitude at which the branch ends."""

@@ -5,6 +5,9 @@ of units there. On a mesh the instant of the stop moves by about one interval in
 Newton's method, because the linearised equations of intervals that stick forget the velocity before
 them. The integrator finds the instant of the stop by its step size, and the states after a period
 depend smoothly on those before. The initial guess is the end of a transient from steady sliding.
+Where slip would reverse in that transient, the branch of orbits from steady sliding may still reach
+the requested amplitude: it is followed to there, or to where the interface force of its orbits
+vanishes.
 
 A tighter integration checks the orbit.
 """
@@ -24,12 +27,14 @@ from asperity.loads import CyclicLoading, Excitation, Programme
 from asperity.orbit.batches import take
 from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.observables import Observables, response_gap, waveform_of
+from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.inertial import StiffInertial
 from asperity.slider.problem import Problem
 from asperity.theory.limits import even_phases
 from asperity.transients.dense_output import DenseOutput
-from asperity.transients.equations import SegmentEquations
+from asperity.transients.equations import SegmentEquations, motion_samples
+from asperity.transients.events import Termination
 from asperity.transients.implicit import STAGES
 from asperity.transients.inputs import checked_integration, first_checkpoint
 from asperity.transients.integration import Checkpoint, Integration
@@ -44,6 +49,11 @@ _TOLERANCES = (1e-10, 1e-12)
 #: Periods integrated for each tolerance; largest change of a logarithm in a Newton step; and change
 #: of a state over the period, in tolerances, at which an orbit is closed.
 _PASSES, _LARGEST_CHANGE, _CLOSED = 20, 2.0, 10.0
+#: Along the branch from steady sliding: tolerance, first and shortest step in shares of the
+#: amplitude, factors on a step that succeeds and that fails, and most steps.
+_ALONG, _FIRST_STEP, _SHORTEST_STEP, _LONGER, _SHORTER, _MOST = 1e-8, 0.1, 1e-6, 1.5, 0.3, 100
+#: Smallest F_i/W of the last orbit below which a branch ends because this force vanishes.
+_VANISHING = 1e-4
 #: Points of the quadrature in each step of the integrator, whose dense output is of degree 5.
 _QUADRATURE = gauss_legendre(8)
 
@@ -65,7 +75,13 @@ class StroboscopicMap(Method):
         for i in range(len(solution.outcome)):
             row = np.array([i])
             point = take(problem, row)
-            orbit, gap = _orbit(jax.tree.map(lambda a: a.item(), point), options.harmonics)
+            scalar = jax.tree.map(lambda a: a.item(), point)
+            Y, share = _settled_states(scalar)
+            orbit, gap = _orbit(scalar, Y, options.harmonics)
+            amplitude = float(np.ravel(point.load.amplitude)[0])
+            if share < 1 and amplitude > 0:
+                solution.outcome[row] = Outcome.REVERSES
+                solution.detail[row] = share * amplitude
             if orbit is not None:
                 solution.store(row, orbit.observables)
                 solution.detail[row] = gap
@@ -83,19 +99,31 @@ class _ClosedOrbit(NamedTuple):
 
     observables: Observables
     period: DenseOutput
+    system: SegmentEquations
+
+    @property
+    def start(self) -> Float:
+        """States at theta = 0."""
+        return np.asarray(self.observables.start[:, 0])
+
+    @property
+    def least_friction(self) -> float:
+        """Smallest F_i/W of the period."""
+        times = self.period.refined()
+        return float(motion_samples(self.system, times, self.period.evaluate(times)).friction.min())
 
 
-def _orbit(point: Problem, harmonics: int) -> tuple[_ClosedOrbit | None, float]:
-    """The orbit that the motion from steady sliding reaches, and the difference of tolerances.
+def _orbit(point: Problem, Y: Float | None, harmonics: int) -> tuple[_ClosedOrbit | None, float]:
+    """The orbit near states at theta = 0, and the difference of tolerances.
 
     None without an orbit, or if the difference is too large.
     """
-    Y, orbits = _settled_states(point), list[_ClosedOrbit]()
+    orbits = list[_ClosedOrbit]()
     for rtol in _TOLERANCES:
         orbit = None if Y is None else _closed(point, Y, rtol, harmonics)
         if orbit is None:
             return None, np.inf
-        Y = np.asarray(orbit.observables.start[:, 0])
+        Y = orbit.start
         orbits.append(orbit)
     first, second = (orbit.observables for orbit in orbits)
     of_response = response_gap(first.numbers, second.numbers)
@@ -123,25 +151,52 @@ def _integration(point: Problem, steps: list[tuple[Any, float]], rtol: float) ->
     return replace(integration, motion=motion)
 
 
-def _integrated(integration: Integration) -> tuple[SegmentEquations, DenseOutput] | None:
-    """The steps of the last segment; None if the motion ends before."""
+def _integrated(integration: Integration) -> tuple[SegmentEquations, DenseOutput] | Termination:
+    """The steps of the last segment, or why the motion ends before."""
     steps = []
     for part in integration.segment_parts():
         if part.termination is not None:
-            return None
+            return part.termination
         if part.checkpoint.segment == len(integration.programme.segments) - 1:
             steps.append(part.dense_output)
     whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*steps, strict=True)))
     return part.system, whole
 
 
-def _settled_states(point: Problem) -> Float | None:
-    """States after some periods from steady sliding."""
+def _settled_states(point: Problem) -> tuple[Float | None, float]:
+    """States after some periods from steady sliding, or at the end of the branch of orbits.
+
+    The second number is the share of the amplitude at which the interface force vanishes on the
+    branch; 1 if it does not, or is not known to.
+    """
     rise = [(point.load.scaled(share), 1) for share in _SHARES]
     integration = _integration(point, [*rise, (point.load, _PERIODS)], _ROUGH)
     integration.checkpoint = first_checkpoint(integration.motion, integration.programme, "steady")
+    steady = integration.checkpoint.states[:-1]
     run = _integrated(integration)
-    return None if run is None else _last_states(run[1])
+    if not isinstance(run, Termination):
+        return _last_states(run[1]), 1.0
+    # A sudden modulation may throw back a slider that has an orbit.
+    return _branch_end(point, steady) if run.kind == "reversal" else (None, 1.0)
+
+
+def _branch_end(point: Problem, steady: Float) -> tuple[Float | None, float]:
+    """As `_settled_states`, by orbits at larger and larger shares of the amplitude."""
+    Y, slope, share, step, orbit = steady, np.zeros_like(steady), 0.0, _FIRST_STEP, None
+    for _ in range(_MOST):
+        step = min(step, 1 - share)
+        scaled = Problem(point.system, point.load.scaled(share + step))
+        found = _closed(scaled, Y + step * slope, _ALONG, 1)
+        if found is not None:
+            slope, orbit = (found.start - Y) / step, found
+            Y, share, step = found.start, share + step, _LONGER * step
+            if share == 1:
+                return Y, share
+        elif orbit is not None and orbit.least_friction < _VANISHING:
+            return None, share
+        elif (step := _SHORTER * step) < _SHORTEST_STEP:
+            break
+    return None, 1.0
 
 
 def _last_states(steps: DenseOutput) -> Float:
@@ -156,14 +211,15 @@ def _closed(point: Problem, Y: Float, rtol: float, harmonics: int) -> _ClosedOrb
         integration = _integration(point, [(point.load, 1)], rtol)
         integration.checkpoint = Checkpoint(0, 0.0, np.append(Y, 0.0))
         run = _integrated(integration)
-        if run is None:
+        if isinstance(run, Termination):
             if marched is None:
                 return None
             Y, marched = marched, None
             continue
         marched, monodromy = _last_states(run[1]), _monodromy(*run)
         if np.abs(marched - Y).max() < _CLOSED * rtol:
-            return _ClosedOrbit(_observables(Y, *run, monodromy, harmonics), run[1])
+            observables = _observables(Y, *run, monodromy, harmonics)
+            return _ClosedOrbit(observables, run[1], run[0])
         try:
             step = np.linalg.solve(np.eye(len(Y)) - monodromy, marched - Y)
         except np.linalg.LinAlgError:
