@@ -241,6 +241,16 @@ def test_coordinates_of_other_data_alone_change_no_outlying_rows():
     assert outlying_rows(residuals_of(values, widened)) == alone
 
 
+def test_rows_that_only_just_determine_the_fit_are_not_fitted_without_each_other():
+    random = np.random.default_rng(5)
+    # Without one of two rows, two readings for two coordinates are left.
+    slopes, values = random.normal(size=(4, 2)), 100 * random.normal(size=4)
+    residuals = residuals_of(values, slopes)._replace(row=np.array([0, 0, 1, 1]))
+    fits = []
+    assert outlying_rows(residuals, fits.append) == []
+    assert not fits
+
+
 def test_errors_of_epsilon_count_as_effective_variance(pmma):
     epsilon, spread, error = np.linspace(0.1, 0.4, 6), 2e-3, 2e-4
 

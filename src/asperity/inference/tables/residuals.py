@@ -250,6 +250,9 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
     most = max(1, int(_SHARE * rows.size), min(2, rows.size // (1 + _OTHERS_EACH)))
     if not p_value_without(residuals, ()) < DESCRIBED:
         return []
+    # Without degrees of freedom the other rows say nothing about a row.
+    if all(math.isnan(p_value_without(residuals, [row])) for row in rows.tolist()):
+        return []
     refit = refit or partial(_linear_refit, residuals)
 
     def fitted(weights: Float) -> Residuals:
