@@ -1,5 +1,6 @@
 """The differentiable response: derivatives against differences, outcomes, one program for all."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,11 +10,20 @@ from scipy.optimize import brentq, fsolve
 
 from asperity import Slider, periodic_response, perturbation_response, response_function
 from asperity.errors import InputError
-from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
+from asperity.laws import (
+    ElastoPlastic,
+    RiceRuina,
+    get_law,
+    law_parameters,
+    parameter,
+    registered,
+)
 from asperity.loads import modulated
 from asperity.orbit import Outcome, differentiable
 from asperity.orbit.gradient import search as search_module
+from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.gradient.search import search_orbits
+from asperity.slider import QuasiStatic
 from references.populations import population
 
 #: Richardson's extrapolation of central differences over 0.2 % and 0.1 %, relative to the
@@ -251,6 +261,53 @@ class TestElastoPlastic:
         values = self.model(self.parameters | {"V": 1e-6, "epsilon": 0.24})
         assert values.mean_friction.shape == ()
         assert values.harmonics.shape == (2,)
+
+
+class _TwoSpeeds(RiceRuina):
+    """F/W = mu0 + A ln(v/V1)/ln(V2/V1) + B phi, which V1 = V2 leaves undefined."""
+
+    name = "two-speeds"
+    V1: float = parameter("law.V1", "velocity")
+    V2: float = parameter("law.V2", "velocity")
+
+    def friction(self, v, state, w):
+        share = jnp.log(v / self.V1) / jnp.log(self.V2 / self.V1)
+        return self.mu0 + self.A * share + self.B * state[0]
+
+
+class _InMicrometres(RiceRuina):
+    name = "in-micrometres"
+    D0: float = eqx.field(converter=lambda length: jnp.asarray(length) * 1e-6)
+
+
+class _InCelsius(RiceRuina):
+    name = "in-celsius"
+    A: float = eqx.field(converter=lambda temperature: 4e-5 * (jnp.asarray(temperature) + 273.15))
+
+
+class _Squared(RiceRuina):
+    name = "squared"
+    D0: float = eqx.field(converter=lambda root: jnp.asarray(root) ** 2)
+
+
+def test_a_problem_has_the_numbers_of_a_users_law():
+    machine = {**MACHINE, "V": 1e-6, "epsilon": 0.05}
+    for law, own in (
+        (_TwoSpeeds, {"V1": 1e-6, "V2": 1e-5}),
+        (_InMicrometres, {"D0": 0.4}),
+    ):
+        given = {n: BASE[n] for n in law_parameters(RiceRuina)} | machine | own
+        equations = ParametrisedProblem(law, QuasiStatic)
+        problem = equations.problem(given)
+        assert equations.values(problem) == pytest.approx(given, rel=1e-15)
+        assert problem.system.slider.law.D0 == pytest.approx(4e-7, rel=1e-15)
+        assert problem.system.omega == pytest.approx(2 * np.pi * 120.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("law", "name"), [(_InCelsius, "A"), (_Squared, "D0")])
+def test_a_law_whose_field_is_no_multiple_of_its_parameter_is_refused(law, name):
+    with pytest.raises(InputError, match=f"another function of {name} in a field of '{law.name}'"):
+        response_function(law)(point("rice-ruina"))
 
 
 def test_law_without_dynamics_is_refused():

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection, Mapping
 from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple
@@ -16,14 +17,14 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require, symbol
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.parameters import RULES, Parameter, law_parameters, point_parameters
 from asperity.parameters.arguments import typed
 from asperity.slider import Motion, QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.parameters import equation_parameters, slider_from, slider_values
+from asperity.slider.parameters import equation_parameters, slider_from
 from asperity.slider.problem import Problem
 
 #: Series of a `Periodic` load, as the names of their coefficients begin.
@@ -123,12 +124,9 @@ class ParametrisedProblem:
 
     def values(self, problem: Problem) -> dict[str, Any]:
         """Parameters of a problem by name: the inverse of `problem`."""
-        system, load = problem
-        values = slider_values(system.slider)
-        values |= {"V": system.V, "frequency": system.omega / (2 * jnp.pi)}
-        if self.damped:
-            values["eta"] = system.eta
-        return values | load_values(load)
+        _, numbers = _numbers_of(self)
+        leaves = jax.tree.leaves(problem)
+        return {name: a / k for (name, k), a in zip(numbers, leaves, strict=True) if k}
 
     def influential(self, wanted: Collection[str] | None = None) -> tuple[str, ...]:
         """Those of `wanted`, or of all, that have an influence, in the order of `names`."""
@@ -153,17 +151,31 @@ class ParametrisedProblem:
 
 @cache
 def _numbers_of(equations: ParametrisedProblem) -> tuple[Any, list[tuple[str, float]]]:
-    """Structure of a problem, and each of its numbers as a parameter and its constant factor."""
-    one = dict.fromkeys(equations.names, 1.0)
-    numbers: dict[int, tuple[str, float]] = {}
+    """Structure of a problem, and each of its numbers as a parameter and its constant factor.
+
+    Raises
+    ------
+    InputError
+        If a user's law converts a parameter otherwise than by a constant factor.
+    """
+    # At 1 a power of a parameter would equal the parameter.
+    some = {name: 2.0 + k for k, name in enumerate(equations.names)}
+    factors: dict[int, tuple[str, float]] = {}
     with jax.ensure_compile_time_eval():  # also where a program that needs it is traced
-        leaves, structure = jax.tree.flatten(equations._built(one))
-        _, push = jax.linearize(equations._built, one)
-        for name in one:
-            slopes = jax.tree.leaves(push({n: float(n == name) for n in one}))
-            numbers |= {i: (name, float(k)) for i, k in enumerate(slopes) if k}
+        # Traced: a user's law need not have finite values for these numbers.
+        built, push = jax.linearize(equations._built, some)
+        for name in some:
+            slopes = jax.tree.leaves(push({n: float(n == name) for n in some}))
+            factors |= {i: (name, float(k)) for i, k in enumerate(slopes) if k}
+    leaves, structure = jax.tree.flatten(built)
     # A number without a parameter is zero.
-    return structure, [numbers.get(i, ("V", 0.0)) for i in range(len(leaves))]
+    numbers = [factors.get(i, ("V", 0.0)) for i in range(len(leaves))]
+    for (name, k), leaf in zip(numbers, leaves, strict=True):
+        rule, law = "keep its parameters times constants", equations.law.name
+        got = f"another function of {symbol(name)} in a field of '{law}'"
+        exact = math.isclose(k * some[name], leaf, rel_tol=1e-9)
+        require(exact, "law", rule, got, "compute it in the equations of the law")
+    return structure, numbers
 
 
 def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
