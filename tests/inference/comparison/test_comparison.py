@@ -23,13 +23,14 @@ from asperity import Slider, periodic_response, samples
 from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.inference import Prior, answers, compare, fit, table_of
-from asperity.inference.comparison.compare import judge, laws_table
+from asperity.inference.comparison.compare import _better_at_extension, judge, laws_table
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
 from asperity.inference.fitting import minima
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.residuals import outlying_rows
 from asperity.inference.tables.term import LockInTerm
+from asperity.inference.unknowns import UnfittableLawError
 from asperity.laws import get_law
 from asperity.orbit import response_function
 from asperity.recording.defects.autoregression import Autoregression
@@ -151,6 +152,47 @@ def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judge
     assert called == ["rice-ruina", "elasto-plastic", "rice-ruina"]
     fits = [judgement.laws["rice-ruina"].fit for judgement in (comparison, exact)]
     assert fits[0].chi2 == pytest.approx(fits[1].chi2, rel=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [4, 6])
+def test_a_missed_minimum_is_near_that_of_a_generalisation_with_correlated_parameters(seed):
+    """alpha differs from 0 by noise, yet at the other estimates rice-ruina describes nothing."""
+    response = response_function("rice-ruina", search=False)
+    truth, fixed, table = drawn_table(seed, "rice-ruina", response)
+    options = {"fixed": fixed, "bare": True, "check_stiffness": False, "starts": 0}
+    exact = fit(table, "rice-ruina", list(truth), start=truth, **options)
+    general = fit(table, LAWS[1], [*truth, "alpha"], start={**truth, "alpha": 0.02}, **options)
+    assert exact.objective.chi2(exact.objective.coordinates(general.values)) > exact.chi2 + 400
+    A = replace(exact.parameters["A"], value=1.03 * exact.values["A"])
+    missing = replace(exact, parameters=exact.parameters | {"A": A})
+    chi2 = exact.objective.chi2(exact.objective.coordinates(missing.values))
+    assert chi2 > exact.chi2 + 20
+    fits = {"rice-ruina": replace(missing, chi2=chi2), LAWS[1]: general}
+    begin = exact.objective.coordinates(_better_at_extension(fits)["rice-ruina"].values)
+    assert exact.objective.chi2(begin) < exact.chi2 + 5
+    assert exact.objective.minimise(begin).chi2 == pytest.approx(exact.chi2, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "numbers", [{"fixed": {"alpha": 0.2}}, {"prior": {"alpha": Prior(0.2, 0.01, "")}}]
+)
+def test_a_law_that_another_contains_for_no_value_is_searched_for_by_itself(
+    made, pmma, monkeypatch, numbers
+):
+    """Rice-Ruina has alpha = 0, which is not fixed at 0.2."""
+    further = {}
+
+    def recorded(data, law, *args, **options):
+        further[law] = options["further"]
+        raise UnfittableLawError(law, "be searched for only", "it")
+
+    monkeypatch.setattr("asperity.inference.comparison.compare.fit", recorded)
+    free = ["eps_ratio", "A", *(["alpha"] if "prior" in numbers else [])]
+    options = {"material": pmma, "evidence": False, "starts": 1}
+    with pytest.raises(InputError, match="two or more that can be fitted"):
+        compare(made("linker-dieterich", 1), LAWS[:2], free, **numbers, **options)
+    assert further == {"rice-ruina": True, "linker-dieterich": True}
 
 
 def test_errors_too_small_exclude_no_law_by_their_size(judged, monkeypatch):

@@ -241,7 +241,15 @@ def compare(
     if isinstance(given["prior"], Material):
         every = list(dict.fromkeys(n for names in free_by_law.values() for n in names))
         given["prior"] = material_priors(given["prior"], every)
+    # Parameters of each law that may take any value, as that of a special case.
+    open_by_law = {name: {*names} - {*given["prior"]} for name, names in free_by_law.items()}
     not_compared: dict[str, str] = {}
+
+    def extended(law: str, others: Iterable[str]) -> bool:
+        """Whether one of the other laws extends a law by parameters that may be zero."""
+        more = ((get_law(n), open_by_law[n]) for n in others)
+        own, chosen = set(_parameters(law)), get_law(law)
+        return any(extends(m, chosen) and {*law_parameters(m)} - own <= free for m, free in more)
 
     work = _STEPS * len(free_by_law) * (2 if evidence else 1)
 
@@ -273,7 +281,7 @@ def compare(
                 "bare": True,
                 "simpler": list(done.values()),
                 # The search of a law that extends this one finds its minima too, see below.
-                "further": not _extended(name, dict(ordered[k + 1 :])),
+                "further": not extended(name, dict(ordered[k + 1 :])),
                 "check_stiffness": False,
                 "progress": lambda done, total, k=k: report(k + done / total),
             }
@@ -286,11 +294,21 @@ def compare(
             report(k + 1)
         return done
 
-    fits = fits_to(several, report)
-    # A law is searched for further minima by itself if the law that extends it has no fit.
-    alone = {n: f for n, f in fits.items() if _extended(n, not_compared) and not _extended(n, fits)}
-    if missed := alone | _better_at_extension(fits):
-        fits |= fits_to(several, lambda _: None, missed)
+    def best_fits(
+        data: Sequence[Any],
+        report: Report,
+        before: Mapping[str, Fit] | None = None,
+    ) -> dict[str, Fit]:
+        fits = fits_to(data, report, before)
+        # A law is searched for further minima by itself if no law that extends it has a fit.
+        fitted = [name for name, f in fits.items() if f.converged]
+        tried = free_by_law if before is None else before
+        alone = {n: f for n, f in fits.items() if extended(n, tried) and not extended(n, fitted)}
+        if missed := alone | _better_at_extension(fits):
+            fits |= fits_to(data, lambda _: None, missed)
+        return fits
+
+    fits = best_fits(several, report)
     if len(fits) < 2:
         rule, reasons = "be two or more that can be fitted to these data", not_compared.values()
         raise InputError("laws", rule, len(fits), "; ".join(reasons))
@@ -301,7 +319,7 @@ def compare(
         holds = [d for d in several if isinstance(d, HealingTable)]
         table = joined(tables)[0] if tables else joined_holds(holds)
         out = np.isin(np.arange(table.rows), outliers)
-        rest = judge(fits_to([table.without(out)], lambda _: None, fits))
+        rest = judge(best_fits([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())
     doubt, stretches = _support(result)
     # The table has the reason for each law.
@@ -330,16 +348,12 @@ def _require_aicc(fit: Fit) -> None:
         raise UnfittableLawError(fit.law, rule, got, advice)
 
 
-def _extended(law: str, others: Iterable[str]) -> bool:
-    """Whether one of the other laws extends a law."""
-    return any(extends(get_law(other), get_law(law)) for other in others)
-
-
 def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Laws that describe a table better at the minimum of a law that extends them.
+    """Laws that describe a table better near the minimum of a law that extends them.
 
-    The result has the fit of the extending law by the name of the law. If the extension is needed,
-    the law describes the table worse at that minimum.
+    The result has the fit of the extending law, with the values there, by the name of the law. If
+    the extension is needed, the law describes the table worse there. A law that would describe it
+    better there, but has no solution, has its own fit.
     """
     missed = {}
     for name, result in fits.items():
@@ -351,10 +365,36 @@ def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
             extended &= set(objective.names) <= set(other.values)
             if not extended or other.chi2 > result.chi2 - GAIN:
                 continue
-            here, there = (objective.chi2(objective.coordinates(f.values)) for f in (result, other))
-            if there < here - GAIN:
-                missed[name] = other
+            special, expected = _without_extension(other, objective.names)
+            tried = result.values, other.values, special
+            here, *there = (objective.chi2(objective.coordinates(values)) for values in tried)
+            k = int(np.argmin(there))
+            if there[k] < here - GAIN:
+                values = tried[1 + k]
+                moved = {n: replace(p, value=values[n]) for n, p in other.parameters.items()}
+                missed[name] = replace(other, parameters=moved)
+            elif math.isinf(there[1]) and expected < here - GAIN:
+                missed.setdefault(name, result)
     return missed
+
+
+def _without_extension(fit: Fit, names: Collection[str]) -> tuple[dict[str, float], float]:
+    """Values at which linearised chi-squared is least with extending parameters of zero, and it.
+
+    `names` are the other parameters. If these are correlated with the extending ones, their
+    estimates describe nothing by themselves, even where the latter differ from zero by noise only.
+    """
+    objective = fit.objective
+    u = objective.coordinates(fit.values)
+    _, J = objective.residuals(u)
+    inside = np.array([k.name in names for k in objective.unknowns])
+    # Without the coefficient of a state its memory length has no influence.
+    zero = ~inside & ~np.array([k.logarithmic for k in objective.unknowns])
+    change = np.where(zero, -u, 0.0)
+    change[inside] = np.linalg.lstsq(J[:, inside], -J @ change)[0]
+    low, high = np.transpose([k.bounds for k in objective.unknowns])
+    values = objective.named(np.clip(u + change, low, high))
+    return values, fit.chi2 + float(np.sum((J @ change) ** 2))
 
 
 def _support(comparison: Comparison) -> tuple[str, str]:
