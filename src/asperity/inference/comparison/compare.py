@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
 from asperity.errors import InputError, enumerated, named, require, symbol, symbols, worded
 from asperity.inference.comparison.evidence import (
@@ -353,7 +354,7 @@ def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
 
     The result has the fit of the extending law, with the values there, by the name of the law. If
     the extension is needed, the law describes the table worse there. A law that would describe it
-    better there, but has no solution, has its own fit.
+    better if chi-squared were linear has its own fit, unless it would be far off.
     """
     missed = {}
     for name, result in fits.items():
@@ -373,9 +374,15 @@ def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
                 values = tried[1 + k]
                 moved = {n: replace(p, value=values[n]) for n, p in other.parameters.items()}
                 missed[name] = replace(other, parameters=moved)
-            elif math.isinf(there[1]) and expected < here - GAIN:
+            elif expected < here - GAIN and not _far_off(expected, other):
                 missed.setdefault(name, result)
     return missed
+
+
+def _far_off(chi2: float, fit: Fit) -> bool:
+    """Whether chi-squared is far off, with uncertainties so large that a fit describes the data."""
+    dof = max(fit.dof, 1)
+    return float(chdtrc(dof, chi2 / max(fit.chi2 / dof, 1.0))) < FAR_OFF
 
 
 def _without_extension(fit: Fit, names: Collection[str]) -> tuple[dict[str, float], float]:
