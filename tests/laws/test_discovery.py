@@ -8,7 +8,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 import pytest
 
-from asperity import Slider
+from asperity import Slider, response_function
 from asperity.errors import InputError
 from asperity.laws import Law, RiceRuina, get_law, known_law, law_parameters, registered, registry
 from asperity.laws.consistency import checked_law
@@ -203,6 +203,13 @@ def test_a_law_that_breaks_an_assumption_is_refused(law, message) -> None:
     with pytest.raises(InputError, match=message) as raised:
         Slider(law(**NUMBERS), spring=2e5, load=7.0)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("law", [WrongSteadyState, Falling])
+def test_the_response_function_refuses_such_a_law_too(law) -> None:
+    point = {"K": 2e5, "W0": 7.0, "V": 1e-6, "frequency": 120.0, "epsilon": 0.1}
+    with pytest.raises(InputError, match="Write your own law"):
+        response_function(law)(NUMBERS | point)
 
 
 def test_correct_laws_pass_for_one_and_for_many_points() -> None:

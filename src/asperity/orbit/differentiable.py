@@ -24,6 +24,7 @@ from asperity._jax import jit_large, spare_mappings
 from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
+from asperity.laws.consistency import checked_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
@@ -43,6 +44,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
 from asperity.slider import Slider
+from asperity.slider.parameters import law_from
 from asperity.slider.problem import checked_problem, flatten, motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
@@ -65,6 +67,7 @@ class ResponseFunction:
         self._program = program
         self._defaults = dict(defaults)
         self._least_points = least_points
+        self._law_is_checked = False
 
     @classmethod
     @typed
@@ -232,6 +235,9 @@ class ResponseFunction:
             wanted = program.equations.valid(parameters)
             wanted = wanted if fast is None else wanted & ~fast.converged
             return _Orbits(program, fast, wanted if program.search else None, None)
+        if not self._law_is_checked:
+            checked_law(law_from(program.equations.law, parameters))
+            self._law_is_checked = True
         spare_mappings()
         # A direct search does not resolve multipliers.
         direct = program.search in ("direct", "coarse") and not program.multipliers
