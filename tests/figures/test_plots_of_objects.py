@@ -13,6 +13,7 @@ from asperity.errors import InputError
 from asperity.figures.plot import Plot
 from asperity.figures.recording import draw_amplitudes
 from asperity.figures.slice import _in_si
+from asperity.figures.style import reason_of_gaps
 from asperity.loads import Hold, Programme, Slide
 from asperity.units import KINDS
 
@@ -33,6 +34,13 @@ def test_curves_are_the_numbers_of_the_response_and_unstable_points_are_open() -
             np.testing.assert_allclose(
                 lines[2 * i + 1].get_xdata(), response.epsilon[~response.stable[i]]
             )
+
+
+def test_a_reason_with_another_number_is_not_another_reason() -> None:
+    folds = ["folds back at epsilon = 0.2", "folds back at epsilon = 2.1e-1"]
+    assert reason_of_gaps([True, True], folds).endswith("have no value: " + folds[0])
+    assert reason_of_gaps([True] * 3, [*folds, "rests"]).endswith("(and 1 other reason)")
+    assert not reason_of_gaps([False], ["rests"])
 
 
 def test_points_in_any_order_are_drawn_from_left_to_right_and_one_that_failed_is_a_gap() -> None:

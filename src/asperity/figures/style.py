@@ -9,6 +9,7 @@ Figures and their numbers are the same bytes on disk whenever the same numbers a
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -116,8 +117,10 @@ def reason_of_gaps(missing: Any, reasons: Any, width: int = 100) -> str:
     texts = Counter(np.asarray(reasons)[np.asarray(missing, bool)].astype(str).tolist())
     if not texts:
         return ""
-    (text, _), *others = texts.most_common()
-    more = f" (and {len(others)} other reasons)" if others else ""
+    text = texts.most_common(1)[0][0]
+    # One reason has other numbers at other points.
+    others = len({re.sub(r"\d[\d.e+-]*", "", t) for t in texts}) - 1
+    more = f" (and {others} other reason{'s' * (others > 1)})" if others else ""
     gaps = f"{texts.total()} of {np.size(missing)} points have no value: {text}{more}"
     return fill(gaps, width)
 

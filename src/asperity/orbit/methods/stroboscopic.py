@@ -186,10 +186,10 @@ def _branch_end(point: Problem, steady: Float) -> tuple[Float | None, float]:
     for _ in range(_MOST):
         step = min(step, 1 - share)
         scaled = Problem(point.system, point.load.scaled(share + step))
-        found = _closed(scaled, Y + step * slope, _ALONG, 1)
-        if found is not None:
-            slope, orbit = (found.start - Y) / step, found
-            Y, share, step = found.start, share + step, _LONGER * step
+        farther = _closed(scaled, Y + step * slope, _ALONG, 1)
+        if farther is not None:
+            slope, orbit = (farther.start - Y) / step, farther
+            Y, share, step = farther.start, share + step, _LONGER * step
             if share == 1:
                 return Y, share
         elif orbit is not None and orbit.least_friction < _VANISHING:
