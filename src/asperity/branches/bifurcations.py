@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
-from asperity.algebra.continuation import STEPS, Attempt, Curves, StepControl, follow
+from asperity.algebra.predictor_corrector import STEPS, Attempt, Curves, StepControl, follow
 from asperity.arrays import Complex, Float, Index
 from asperity.orbit.floquet import FOLD, kind_of_crossing, log_multipliers
 from asperity.orbit.mesh.arclength import (

@@ -18,7 +18,7 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
+from asperity.algebra.predictor_corrector import STEPS, STUCK, Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Complex, Float, Index
 from asperity.branches.bifurcations import (
     BranchFollower,

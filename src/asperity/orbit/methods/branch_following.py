@@ -17,7 +17,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
+from asperity.algebra.predictor_corrector import Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Float, Index
 from asperity.loads import Excitation
 from asperity.orbit.batches import put, run_chunks, take

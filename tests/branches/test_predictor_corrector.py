@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
+from asperity.algebra.predictor_corrector import STEPS, STUCK, Attempt, Curves, StepControl, follow
 
 CONTROL = StepControl(
     shortest=1e-4,
