@@ -20,7 +20,7 @@ from asperity.loads import Programme
 from asperity.protocol.steps import parse_step
 from asperity.tribometer.sensors import DisplacementGauge, LoadCell
 from asperity.tribometer.tribometer import Recorder, Tribometer
-from references.memory_tests import STATE_RATES, Interface
+from references.holds_and_steps import STATE_RATES, Interface
 from references.populations import population
 
 A, B, D0, V0 = 0.008, 0.009, 3e-6, 1e-6

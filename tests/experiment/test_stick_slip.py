@@ -9,7 +9,7 @@ from asperity.errors import InputError
 from asperity.experiment import stick_slip_response
 from asperity.laws import Amontons, RiceRuina, registered
 from asperity.theory import overshooting_cycle
-from references.memory_tests import STATE_RATES
+from references.holds_and_steps import STATE_RATES
 from references.populations import draws, population
 
 MU0, V0 = 0.6, 1e-6

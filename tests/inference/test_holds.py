@@ -18,7 +18,7 @@ from asperity.inference.answers import read_data
 from asperity.inference.holds import HoldTerm, joined_holds
 from asperity.laws import RiceRuina
 from asperity.questions.fit import Fit
-from references.memory_tests import Interface
+from references.holds_and_steps import Interface
 
 A, B, D0 = 0.011, 0.014, 4e-6
 TIMES = np.array([3.0, 30.0, 300.0, 3e3, 3e4])

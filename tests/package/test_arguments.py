@@ -134,7 +134,7 @@ def test_a_quantity_is_a_number_or_a_text(value) -> None:
         (lambda: asp.orbit.ResponseFunction(3, {}), "program"),
         (lambda: asp.orbit.response_function("rice-ruina")(["V"]), "parameters"),
         (lambda: asp.transients.Trajectory.joined(3), "blocks"),
-        (lambda: asp.theory.memory.steady_growth(SLIDER), "motion"),
+        (lambda: asp.theory.linear_stability.steady_growth(SLIDER), "motion"),
         (lambda: asp.parameters.Parameter(3, "length", "positive"), "name"),
         (lambda: output_file(3), "path"),
         (lambda: UnfinishedText("out.csv", {}), "target"),

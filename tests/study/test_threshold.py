@@ -10,7 +10,7 @@ from asperity.errors import InputError
 from asperity.laws import get_law
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales, stiffness_threshold
-from asperity.theory.memory import critical_stiffness
+from asperity.theory.linear_stability import critical_stiffness
 
 PMMA = materials.load("bureau2000")
 SLIDERS = {

@@ -22,7 +22,7 @@ from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import flatten, require_even_track
-from asperity.theory.memory import steady_growth
+from asperity.theory.linear_stability import steady_growth
 from asperity.transients.batch import End
 from asperity.transients.hold_and_step import (
     SETTLED,
@@ -220,7 +220,7 @@ def hold_response(
     slider = _slider(slider, stiffness)
     time = obeying(hold_time, "hold_response.hold_time", "time", "positive")
     longest, rule = float(np.max(time, initial=0.0)), f"be at most {_LONGEST:g} s"
-    advice = "asperity.theory.memory has the limits of long holds"
+    advice = "asperity.theory.holds_and_steps has the limits of long holds"
     require(longest <= _LONGEST, "hold_response.hold_time", rule, f"{longest:g} s", advice)
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
     (flat, V, time), shape = flatten((slider, V, time), "hold_response")

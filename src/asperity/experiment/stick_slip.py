@@ -17,7 +17,7 @@ from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn
 from asperity.slider import Slider, equation_of_motion
 from asperity.slider.problem import flatten, require_even_track
-from asperity.theory.memory import steady_growth
+from asperity.theory.linear_stability import steady_growth
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 

@@ -79,7 +79,7 @@ def stability_statement(protocol: Protocol) -> str:
 def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     """The sentence, from the growth rate of a small disturbance of steady sliding."""
     from asperity.slider.problem import flatten
-    from asperity.theory.memory import steady_growth
+    from asperity.theory.linear_stability import steady_growth
 
     law, level = protocol.slider.law, protocol.programme.level
     if not law.rate_dependent:

@@ -23,7 +23,7 @@ from asperity.operating_point import known_parameters
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import OUTPUTS, Output, Parameter, point_parameters
 from asperity.parameters.arguments import shown
-from asperity.theory.memory import sliding_threshold
+from asperity.theory.linear_stability import sliding_threshold
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
 #: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).

@@ -24,7 +24,7 @@ from asperity.slider.parameters import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
 from asperity.study.points import POINT_BYTES, Answers, SweepOutcome, critical_stiffness
 from asperity.study.responses import answers_of_law, bifurcation_kinds
-from asperity.theory.memory import sliding_threshold
+from asperity.theory.linear_stability import sliding_threshold
 
 #: What happens at a threshold.
 BIFURCATIONS = ("fold", "period doubling", "Neimark-Sacker")
@@ -43,7 +43,7 @@ class StiffnessThreshold:
     ratio : array, shape (...)
         K/K_c, with K_c from `natural_scales`; NaN also for a law without A, B and D0. Of `nagata`,
         `cut-off` and `strength-area` unmodulated sliding is unstable below another stiffness:
-        `asperity.theory.memory.critical_stiffness` has it over W0.
+        `asperity.theory.linear_stability.critical_stiffness` has it over W0.
     kind : str array, shape (...)
         "fold", "period doubling" or "Neimark-Sacker".
     mode_frequency : array, shape (...)
@@ -65,7 +65,7 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
 
     K_c = (B - A) W0/D0 and f_c = sqrt((B - A)/A) V/(2 pi D0), Eqs. (18) and (19) of
     Bureau et al. (2000); for a law with a second state see
-    `asperity.theory.memory.sliding_threshold`.
+    `asperity.theory.linear_stability.sliding_threshold`.
 
     Parameters
     ----------

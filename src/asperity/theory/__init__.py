@@ -1,6 +1,6 @@
 """Closed forms and limits: averaged, adiabatic, first and second order in eps."""
 
-from asperity.theory import closed_forms, memory
+from asperity.theory import closed_forms, holds_and_steps, linear_stability
 from asperity.theory.ageing_response import AgeingResponse, ageing_response
 from asperity.theory.closed_forms import SmallModulation
 from asperity.theory.perturbation import PerturbationResponse, perturbation_response
@@ -14,7 +14,8 @@ __all__ = [
     "ageing_response",
     "closed_forms",
     "healing_drop",
-    "memory",
+    "holds_and_steps",
+    "linear_stability",
     "overshooting_cycle",
     "perturbation_response",
 ]

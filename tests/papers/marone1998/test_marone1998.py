@@ -12,7 +12,7 @@ import asperity_papers.marone1998 as package
 from asperity import materials
 from asperity.errors import InputError
 from asperity.ledger import Paper, altered
-from references.memory_tests import Interface
+from references.holds_and_steps import Interface
 
 PAPER = Paper("marone1998", "asperity_papers.marone1998")
 FOLDER = Path(package.__file__).parent

@@ -11,7 +11,7 @@ from asperity import materials
 from asperity.errors import InputError
 from asperity.study import SweepPlan, job, open_store, run_sweep, store_status
 from asperity.study.grid import SweepGrid
-from asperity.theory.memory import critical_stiffness
+from asperity.theory.linear_stability import critical_stiffness
 from references.closed_form_sweep import ThisProcess
 
 PMMA = materials.load("bureau2000")

@@ -6,7 +6,7 @@ import numpy as np
 
 from asperity.experiment import step_response
 from asperity.ledger import check
-from asperity.theory import memory
+from asperity.theory import holds_and_steps, linear_stability
 from asperity_papers.marone1998.laboratory import (
     AGEING,
     DECADE,
@@ -52,7 +52,7 @@ def dynamic_slope(laboratory: Laboratory) -> Numbers:
 @check("linear-decay")
 def linear_decay(laboratory: Laboratory) -> Numbers:
     p = laboratory.numbers
-    rate = memory.decay_rates(laboratory.illustration(PRZ), p.V0)[0].real
+    rate = linear_stability.decay_rates(laboratory.illustration(PRZ), p.V0)[0].real
     return {"off": float(rate * p.D0_2 - 1)}
 
 
@@ -103,7 +103,7 @@ def slip_scales_with_velocity(laboratory: Laboratory) -> Numbers:
     u = np.linspace(0, 20, 200_001) * p.D0_2
     slips = {}
     for r in (2.0, 10.0, 100.0):
-        state = np.asarray(memory.state_after_step(laboratory.illustration(AGEING), r, u))
+        state = np.asarray(holds_and_steps.state_after_step(laboratory.illustration(AGEING), r, u))
         slips[r] = float(u[np.argmax(state <= 0.05 * np.log(r))] / p.D0_2)
     return {
         "2 to 10": slips[10.0] / slips[2.0],
@@ -116,7 +116,7 @@ def slip_scales_with_velocity(laboratory: Laboratory) -> Numbers:
 def symmetric(laboratory: Laboratory, name: str) -> Numbers:
     u = laboratory.numbers.D0_2 * np.array([0.1, 1.0, 3.0])
     law = laboratory.illustration(name)
-    up, down = (np.asarray(memory.state_after_step(law, r, u)) for r in (10.0, 0.1))
+    up, down = (np.asarray(holds_and_steps.state_after_step(law, r, u)) for r in (10.0, 0.1))
     return {"off": float(np.max(np.abs(up + down)))}
 
 
@@ -157,8 +157,8 @@ def normalising_by_length(laboratory: Laboratory) -> Numbers:
 def stability(laboratory: Laboratory) -> Numbers:
     p, below, above = laboratory.numbers, {}, {}
     for name, letter in LAWS.items():
-        weak = memory.critical_stiffness(laboratory.granite(name), p.V0)
-        strong = memory.critical_stiffness(laboratory.granite(name, A=0.01), p.V0)
+        weak = linear_stability.critical_stiffness(laboratory.granite(name), p.V0)
+        strong = linear_stability.critical_stiffness(laboratory.granite(name, A=0.01), p.V0)
         below[f"{letter}, weakening"] = weak * p.D0 / (p.B - p.A)
         # Stable at any stiffness: none is critical.
         above[f"{letter}, strengthening"] = 1.0 if strong == 0 else -1.0

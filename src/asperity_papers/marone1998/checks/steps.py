@@ -8,7 +8,7 @@ from asperity import Slider, transient
 from asperity.experiment import VelocityStepResponse, step_response
 from asperity.ledger import check
 from asperity.loads import Programme, Slide
-from asperity.theory import memory
+from asperity.theory import holds_and_steps
 from asperity_papers.marone1998.laboratory import (
     AGEING,
     LAWS,
@@ -92,7 +92,7 @@ def ageing_asymmetric(laboratory: Laboratory) -> Numbers:
     D0, law = laboratory.numbers.D0_2, laboratory.illustration(AGEING)
     u, imposed = np.linspace(0, 10, 100_001) * D0, {}
     for r in (10.0, 0.1):
-        state = np.abs(np.asarray(memory.state_after_step(law, r, u)))
+        state = np.abs(np.asarray(holds_and_steps.state_after_step(law, r, u)))
         imposed[r] = u[np.argmax(state <= 0.05 * np.log(10))]
     on_spring = up_and_down(laboratory, AGEING, settling=True).settling_slip / D0
     return {

@@ -8,9 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from asperity.errors import InputError
-from asperity.laws import ElastoPlastic, ElastoPlasticAge, PrakashClifton, TwoState, registered
-from asperity.theory import closed_forms, healing_drop, memory, overshooting_cycle
-from references.memory_tests import STATE_RATES, Interface
+from asperity.laws import registered
+from asperity.theory import healing_drop, overshooting_cycle
+from asperity.theory.holds_and_steps import ageing_long_hold, healing_rate_limit, state_after_step
+from references.holds_and_steps import STATE_RATES, Interface
 
 A, B, D0, V0 = 0.008, 0.009, 3e-6, 1e-6
 NUMBERS = {"mu0": 0.6, "A": A, "B": B, "D0": D0, "V0": V0}
@@ -19,83 +20,6 @@ LAWS = tuple(STATE_RATES)
 
 def law(name, **changes):
     return registered()[name](**(NUMBERS | changes))
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_states_relax_over_the_memory_length(name):
-    np.testing.assert_allclose(memory.decay_rates(law(name), "3 um/s"), [1 / D0], rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_the_critical_stiffness_of_three_laws_is_the_closed_form(name):
-    assert memory.critical_stiffness(law(name), 2e-6) == pytest.approx((B - A) / D0, rel=1e-9)
-    assert memory.critical_stiffness(law(name, A=0.01), 2e-6) == 0
-    assert closed_forms.critical_stiffness_form(name, elastic=False, inertia=False)
-
-
-def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
-    """Elastic asperities by their closed forms; of two states as the larger of two alike."""
-    lengths = {"D0": D0, "lambda_": 2e-6}
-    small = closed_forms.SmallModulation(
-        mu=0.6, A=A, B=B, K=1.0, W0=1.0, V=V0, omega=1.0, **lengths
-    )
-    for kind, age in ((ElastoPlastic, "slider"), (ElastoPlasticAge, "plastic")):
-        closed = closed_forms.critical_stiffness_elastic(small, age)
-        got = memory.critical_stiffness(kind(**NUMBERS, lambda_=2e-6), V0)
-        assert got == pytest.approx(float(closed), rel=1e-8)
-    # Two states of one length are one state of B + B2.
-    same = TwoState(**(NUMBERS | {"B": 0.005}), B2=0.004, D2=D0)
-    assert memory.critical_stiffness(same, V0) == pytest.approx((B - A) / D0, rel=1e-8)
-    # A load memory that relaxes in time, 1e11 times faster than the age: it has no effect.
-    loaded = PrakashClifton(**NUMBERS, L=1e-7, V_star=1e-2)
-    assert memory.critical_stiffness(loaded, 3e-12) == pytest.approx((B - A) / D0, rel=1e-8)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"B": 0.5 * A, "B2": 1.5 * A, "D2": 7 * D0},  # weakening by the second state alone
-        {"B": 1.6 * A, "B2": -0.7 * A, "D2": 9 * D0},  # strengthening, yet unstable
-        {"B": 0.5 * A, "B2": 0.2 * A, "D2": 3 * D0},  # stable at any stiffness
-        {"B": B, "B2": 0.0, "D2": D0 / 5},
-    ],
-)
-def test_the_threshold_of_two_states_is_where_their_equations_lose_stability(change):
-    law = TwoState(**(NUMBERS | change))
-    closed = memory.sliding_threshold({"A": A, "D0": D0, **change})
-    expected = memory.critical_stiffness(law, V0)
-    assert max(float(closed.stiffness), 0.0) == pytest.approx(expected, rel=1e-9)
-    a1, product = A - change["B"] - change["B2"], D0 * change["D2"]
-    a2 = A * (D0 + change["D2"]) - change["B"] * change["D2"] - change["B2"] * D0
-    k = float(closed.stiffness)
-    cubic = [A * product, a2 + k * product, a1 + k * (D0 + change["D2"]), k]
-    leading = np.roots(cubic)[np.argmax(np.roots(cubic).real)] if k > 0 else 0.0
-    assert abs(leading.imag) == pytest.approx(float(closed.wavenumber), rel=1e-9)
-
-
-def test_the_threshold_of_one_state_is_that_of_the_paper():
-    closed = memory.sliding_threshold({"A": A, "B": np.array([B, 0.5 * A]), "D0": D0})
-    np.testing.assert_allclose(closed.stiffness, [(B - A) / D0, -0.5 * A / D0], rtol=1e-15)
-    np.testing.assert_allclose(closed.wavenumber, [np.sqrt((B - A) / A) / D0, 0.0], rtol=1e-14)
-
-
-def test_several_interfaces_are_refused_in_one_sentence():
-    with pytest.raises(InputError, match=r"law\.A must be one number, got an array"):
-        memory.critical_stiffness(law("rice-ruina", A=np.array([0.008, 0.01])), V0)
-
-
-@pytest.mark.parametrize("share", [0.9, 1.1])
-def test_no_spring_stabilises_sliding_on_soft_asperities(share):
-    """Spring and asperities in series, with the age on the plastic velocity: k below 1/lambda."""
-    length = share * D0 / (B - A)
-    series = (B - A) / (D0 - (B - A) * length) if share < 1 else np.inf
-    soft = ElastoPlasticAge(**NUMBERS, lambda_=length)
-    assert memory.critical_stiffness(soft, V0) == pytest.approx(series, rel=1e-8)
-    small = closed_forms.SmallModulation(
-        mu=0.6, A=A, B=B, D0=D0, K=1.0, W0=1.0, V=V0, omega=1.0, lambda_=length
-    )
-    closed = closed_forms.critical_stiffness_elastic(small, "plastic")
-    assert float(closed) == pytest.approx(series, rel=1e-8)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -110,12 +34,12 @@ def test_the_state_after_a_step_is_the_integrated_one(name, ratio):
     options = {"rtol": 1e-12, "atol": 1e-13, "first_step": 1e-6 * slip[0] / max(ratio, 1)}
     done = solve_ivp(rate, (0, slip[-1]), [0.0], "DOP853", t_eval=slip, **options)
     expected = done.y[0] + np.log(ratio)
-    got = memory.state_after_step(law(name), ratio, slip)
+    got = state_after_step(law(name), ratio, slip)
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-11)
 
 
 def test_the_slip_laws_state_is_odd_in_the_step():
-    up, down = (memory.state_after_step(law("ruina-slip"), r, 2e-6) for r in (10.0, 0.1))
+    up, down = (state_after_step(law("ruina-slip"), r, 2e-6) for r in (10.0, 0.1))
     assert float(up + down) == pytest.approx(0, abs=1e-15)
 
 
@@ -125,7 +49,7 @@ def test_healing_after_a_long_hold_is_the_integrated_one(k):
     times = np.array([1e4, 1e7])
     interface = Interface("rice-ruina", A, B, D0, k)
     exact = np.array([interface.hold(V0, t)[2] for t in times])
-    closed = memory.ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=times, stiffness=k)
+    closed = ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=times, stiffness=k)
     left = np.abs(exact - closed.leading)
     over = np.abs(exact - closed.healing)
     assert (over < left / 2).all()
@@ -136,7 +60,7 @@ def test_healing_after_a_long_hold_is_the_integrated_one(k):
 def test_the_reload_slip_has_no_gap_at_equal_lengths():
     """k D0 = B is a removable point of the closed form."""
     k = B / D0 * np.array([1 - 1e-5, 1, 1 + 1e-5])
-    at = memory.ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=1e5, stiffness=k)
+    at = ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=1e5, stiffness=k)
     assert np.ptp(np.asarray(at.healing)) < 1e-6
 
 
@@ -147,7 +71,7 @@ def test_the_healing_rate_tends_to_its_limit():
         numbers = {"A": A, "B": B, "D0": D0} | changes
         interface = Interface(name, k=k, **numbers)
         (_, _, low, *_), (_, _, high, *_) = (interface.hold(V0, t) for t in (time, 10 * time))
-        return (high - low) / float(memory.healing_rate_limit(law(name, **changes)))
+        return (high - low) / float(healing_rate_limit(law(name, **changes)))
 
     assert rate("rice-ruina", 1e11) == pytest.approx(1, abs=3e-3)
     assert rate("perrin-rice-zheng", 1e9) == pytest.approx(1, abs=5e-3)
@@ -160,18 +84,16 @@ def test_the_healing_rate_tends_to_its_limit():
 
 def test_laws_without_a_closed_form_are_refused():
     with pytest.raises(InputError, match="rice-ruina, ruina-slip or perrin"):
-        memory.healing_rate_limit(law("regularised"))
+        healing_rate_limit(law("regularised"))
     with pytest.raises(InputError, match="ageing law"):
-        memory.ageing_long_hold(law("ruina-slip"), velocity=V0, hold_time=10, stiffness=1e4)
+        ageing_long_hold(law("ruina-slip"), velocity=V0, hold_time=10, stiffness=1e4)
     with pytest.raises(InputError, match=r"above law\.A / 2"):
-        memory.healing_rate_limit(law("perrin-rice-zheng", A=0.03))
+        healing_rate_limit(law("perrin-rice-zheng", A=0.03))
 
 
 def test_closed_forms_have_derivatives():
     def healing(b):
-        held = memory.ageing_long_hold(
-            law("rice-ruina", B=b), velocity=V0, hold_time=1e4, stiffness=2e3
-        )
+        held = ageing_long_hold(law("rice-ruina", B=b), velocity=V0, hold_time=1e4, stiffness=2e3)
         return held.healing
 
     step = 1e-6
