@@ -23,8 +23,8 @@ from asperity.parameters.arguments import typed
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import flatten, require_even_track
 from asperity.theory.linear_stability import steady_growth
-from asperity.transients.batch import End
-from asperity.transients.hold_and_step import (
+from asperity.transients.constant_drive import End
+from asperity.transients.holds_and_steps import (
     SETTLED,
     HoldResponse,
     SettlingDistance,

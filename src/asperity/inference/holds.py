@@ -29,7 +29,7 @@ from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 from asperity.slider.parameters import slider_from
-from asperity.transients.hold_and_step import hold
+from asperity.transients.holds_and_steps import hold
 
 #: The column that identifies a table of holds.
 HEALING = "healing"

@@ -2,7 +2,7 @@
 
 from asperity.transients.events import Event, Termination
 from asperity.transients.integration import Checkpoint
-from asperity.transients.motion import integrate_blocks, transient
 from asperity.transients.trajectory import Trajectory
+from asperity.transients.transient import integrate_blocks, transient
 
 __all__ = ["Checkpoint", "Event", "Termination", "Trajectory", "integrate_blocks", "transient"]

@@ -6,7 +6,7 @@ sliding to the next such fall. In every cycle the force passes that level: its e
 instants at which the slider moves with the velocity V of the drive, and there the force differs
 from that of steady sliding only by the state of the interface, upwards at a peak and downwards at a
 trough. The states at the falls form a return map s -> P(s), whose fixed point is computed by
-Newton's method with the derivatives of `asperity.transients.variation`:
+Newton's method with the derivatives of `asperity.transients.variational_equations`:
 
     (1 - P_s) ds = P(s) - s,      P_s = (1 - f q^T / (q f)) D_s,
 
@@ -40,7 +40,7 @@ from asperity.transients.dense_output import DenseOutput
 from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
-from asperity.transients.variation import stage_times, variations
+from asperity.transients.variational_equations import stage_times, variations
 
 #: Velocities of sliding before the first cycle, over that of the drive. The second is used where
 #: the first slip after the slower sliding is too large for the law.

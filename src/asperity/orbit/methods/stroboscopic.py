@@ -38,7 +38,7 @@ from asperity.transients.events import Termination
 from asperity.transients.implicit import STAGES
 from asperity.transients.inputs import checked_integration, first_checkpoint
 from asperity.transients.integration import Checkpoint, Integration
-from asperity.transients.variation import stage_times, variations
+from asperity.transients.variational_equations import stage_times, variations
 
 #: Shares of the modulation in the first periods of a transient, since a sudden start may throw the
 #: slider back; number of periods after these; tolerance; and most steps of an integration.

@@ -13,7 +13,7 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.slider import QuasiStatic, Slider
-from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_many
+from asperity.transients.constant_drive import ConstantDrive, Drive, End, Reached, drive_many
 
 #: Sliding counts as steady within this share of the change of force from the extremum.
 SETTLED = 0.05
