@@ -20,7 +20,7 @@ from asperity.experiment import (
     Exciter,
     amplitude_series,
 )
-from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
+from asperity.experiment.recorded_motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Programme, Slide
 from asperity.lock_in import demodulation as lock_in
 from asperity.recording import read

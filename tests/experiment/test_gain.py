@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.experiment import channel_gain
-from asperity.experiment.motion import motion_rate
+from asperity.experiment.recorded_motion import motion_rate
 from asperity.tribometer.sensors import Accelerometer, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
 

@@ -20,17 +20,17 @@ from asperity.experiment.loading import (
     elastic_length as elastic_length,
     loading_recording as loading_recording,
 )
-from asperity.experiment.motion import (
-    DISPLACEMENT as DISPLACEMENT,
-    DRIVE as DRIVE,
-    FORCE as FORCE,
-    LOAD as LOAD,
-)
 from asperity.experiment.programmes import (
     SlideHoldSlide as SlideHoldSlide,
     VelocitySteps as VelocitySteps,
     slide_hold_slide as slide_hold_slide,
     velocity_steps as velocity_steps,
+)
+from asperity.experiment.recorded_motion import (
+    DISPLACEMENT as DISPLACEMENT,
+    DRIVE as DRIVE,
+    FORCE as FORCE,
+    LOAD as LOAD,
 )
 from asperity.experiment.stick_slip import (
     StickSlip as StickSlip,

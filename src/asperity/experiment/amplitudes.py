@@ -19,7 +19,7 @@ import numpy as np
 from asperity.air import AirLayer, transfer_function
 from asperity.arrays import Float
 from asperity.errors import require
-from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
+from asperity.experiment.recorded_motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
 from asperity.measurement.campaign import labelled_rows, modulated_rows
 from asperity.measurement.measure import Measurement, measure

@@ -15,7 +15,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
-from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
+from asperity.experiment.recorded_motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Slide
 from asperity.measurement.samples import require_one_dimension
 from asperity.parameters.arguments import at_least, number, typed

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from asperity.errors import require
-from asperity.experiment.motion import recorded_motion
+from asperity.experiment.recorded_motion import recorded_motion
 from asperity.loads import Hold, ProgrammeStep, Slide
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import Given, LaidOut, LoadAndVelocity

@@ -9,7 +9,7 @@ from asperity.slider.inertial import (
 from asperity.slider.motion import Motion as Motion
 from asperity.slider.problem import equation_of_motion as equation_of_motion
 from asperity.slider.quasi_static import QuasiStatic as QuasiStatic
-from asperity.slider.radiating import Radiating as Radiating
+from asperity.slider.radiation_damping import Radiating as Radiating
 from asperity.slider.reversing import ReversingInertial as ReversingInertial, reversing as reversing
 from asperity.slider.slider import Slider as Slider
 

@@ -23,7 +23,7 @@ from asperity.parameters.arguments import broadcast_shape, typed
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
-from asperity.slider.radiating import Radiating
+from asperity.slider.radiation_damping import Radiating
 from asperity.slider.slider import Slider
 
 T = TypeVar("T")

@@ -24,8 +24,8 @@ from asperity.inference.fitting.result import Optimum, fit_record
 from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, with_wrong_samples, without_spikes
-from asperity.inference.runs.levels import level_change, level_rates
 from asperity.inference.runs.noise import largest_departure
+from asperity.inference.runs.rate_dependence import level_change, level_rates
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import get_law
 from benchmarks import coverage

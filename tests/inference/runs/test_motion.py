@@ -7,7 +7,7 @@ from benchmarks.coverage import integrated
 from asperity.algebra.runge_kutta import rodas_5p
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.gauge import reading_at
-from asperity.inference.runs.motion import recorded_friction, run_equations
+from asperity.inference.runs.likelihood import recorded_friction, run_equations
 from asperity.laws import get_law
 from references.compilation import compiled_programs
 from references.populations import population

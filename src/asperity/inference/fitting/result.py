@@ -15,7 +15,7 @@ from asperity.errors import worded
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.assembly import ONE_LOAD
-from asperity.inference.runs.levels import LevelChange, level_change
+from asperity.inference.runs.rate_dependence import LevelChange, level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain

@@ -12,7 +12,7 @@ import numpy as np
 from asperity.arrays import Float, Index
 from asperity.errors import InputError, require
 from asperity.inference.runs.drive import Drive
-from asperity.inference.runs.levels import LevelRate, level_rates
+from asperity.inference.runs.rate_dependence import LevelRate, level_rates
 from asperity.inference.runs.recorded_drive import (
     constant_velocities,
     cut_uncertainty,

@@ -19,7 +19,7 @@ from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.gauge import reading_at
-from asperity.inference.runs.motion import (
+from asperity.inference.runs.likelihood import (
     MOST_STEPS,
     RunArrays,
     RunResiduals,
