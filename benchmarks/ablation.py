@@ -21,8 +21,8 @@ import numpy as np
 
 from asperity.orbit import Outcome
 from asperity.orbit.batches import take
-from asperity.orbit.methods import collocation, series
-from asperity.orbit.methods.branch_following import MESHES, BranchFollowing
+from asperity.orbit.methods import collocation, fourier_series
+from asperity.orbit.methods.amplitude_continuation import MESHES, AmplitudeContinuation
 from asperity.orbit.search import METHODS, find_orbits
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.problem import Problem
@@ -52,7 +52,7 @@ def _finished_by(*names: str) -> Callable[[Solution], np.ndarray]:
 
 
 def _coarse_branches() -> tuple[Method, ...]:
-    coarse = BranchFollowing(MESHES[:1])
+    coarse = AmplitudeContinuation(MESHES[:1])
     return tuple(coarse if method.name == coarse.name else method for method in METHODS)
 
 
@@ -62,17 +62,25 @@ STAGES = (
     Stage(
         "series of 191 nodes",
         _finished_by("series"),
-        constant=(series, "NODES", series.NODES[:-1]),
+        constant=(fourier_series, "NODES", fourier_series.NODES[:-1]),
     ),
     Stage("averaged limit", _finished_by("collocation"), _without("collocation")),
     Stage("transients", _finished_by("transient"), _without("transient")),
-    Stage("branch following", _finished_by("branch following"), _without("branch following")),
+    Stage(
+        "continuation in amplitude",
+        _finished_by("continuation in amplitude"),
+        _without("continuation in amplitude"),
+    ),
     Stage(
         f"the same on {MESHES[1].intervals} intervals",
-        _finished_by("branch following", "frequency path"),
+        _finished_by("continuation in amplitude", "continuation in frequency"),
         _coarse_branches(),
     ),
-    Stage("frequency path", _finished_by("frequency path"), _without("frequency path")),
+    Stage(
+        "continuation in frequency",
+        _finished_by("continuation in frequency"),
+        _without("continuation in frequency"),
+    ),
     Stage(
         f"refinement to {collocation.MESHES[-1]} intervals",
         lambda s: s.converged & (s.iterations == collocation.MESHES[-1]),

@@ -12,7 +12,7 @@ from asperity.branches import bifurcations
 from asperity.branches.parameters import one_problem
 from asperity.errors import InputError
 from asperity.loads import Harmonic
-from asperity.orbit.methods.branch_following import MESHES, follow_from_steady_sliding
+from asperity.orbit.methods.amplitude_continuation import MESHES, follow_from_steady_sliding
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten
 from references.populations import population

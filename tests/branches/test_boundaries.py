@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.branches import stability
-from asperity.branches.stability import BoundaryHalf
+from asperity.branches import boundaries
+from asperity.branches.boundaries import BoundaryHalf
 from asperity.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -126,7 +126,7 @@ def test_lines_that_are_not_followed_to_their_ends_are_named(slow, monkeypatch):
     """Boundaries on the rest of such a line were missed without a word."""
     plane = {"x": "epsilon", "y": "K", "x_span": (0, 0.01), "y_span": (4e5, 5e5)}
     at = {"velocity": slow.V, "frequency": slow.frequency, "lines": 2}
-    monkeypatch.setattr(stability.BranchFollower, "begin", lambda self: None)
+    monkeypatch.setattr(boundaries.BranchFollower, "begin", lambda self: None)
     none = asp.stability_boundary(slow.slider, **plane, **at)
     lines = [f"K beyond 4e+05 N/m at epsilon = {e}" for e in (0, 0.01)]
     lines += [f"epsilon beyond 0 at K = {K} N/m" for K in ("4e+05", "5e+05")]

@@ -5,7 +5,7 @@ import pytest
 
 import asperity as asp
 from asperity.orbit import Outcome
-from asperity.orbit.methods.branch_following import BranchFollowing, BranchMesh
+from asperity.orbit.methods.amplitude_continuation import AmplitudeContinuation, BranchMesh
 from asperity.orbit.solution import SearchOptions
 from asperity.slider.problem import checked_problem, flatten
 from references.populations import population
@@ -86,6 +86,6 @@ def test_slip_does_not_run_away_beyond_what_radiation_damping_permits(shooting):
         radiation_damping=np.array([1e-6, 1e-2]) * base.slider.law.A * base.W0 / V,
     )
     problem, _ = flatten(given)
-    method = BranchFollowing((BranchMesh(72, 100),))
+    method = AmplitudeContinuation((BranchMesh(72, 100),))
     solution = method.solve(problem, SearchOptions(2, 0))
     assert solution.outcome.tolist() == [outcome, Outcome.NO_ORBIT]

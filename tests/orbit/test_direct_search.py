@@ -12,7 +12,7 @@ from asperity import Slider
 from asperity.errors import InputError
 from asperity.laws import RiceRuina
 from asperity.orbit import KnownOrbits, Outcome, response_function
-from asperity.orbit.gradient import search as direct
+from asperity.orbit.derivatives import mesh_search as direct
 from asperity.orbit.methods.from_transient import settled_orbits
 from asperity.slider.problem import checked_problem, flatten
 

@@ -20,9 +20,9 @@ from asperity.laws import (
 )
 from asperity.loads import modulated
 from asperity.orbit import Outcome, differentiable
-from asperity.orbit.gradient import search as search_module
-from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.gradient.search import search_orbits
+from asperity.orbit.derivatives import mesh_search as search_module
+from asperity.orbit.derivatives.mesh_search import search_orbits
+from asperity.orbit.derivatives.parametrised import ParametrisedProblem
 from asperity.slider import QuasiStatic
 from references.populations import population
 

@@ -7,7 +7,7 @@ import asperity as asp
 from asperity.laws import RiceRuina
 from asperity.loads import Harmonic, Periodic
 from asperity.orbit.methods import collocation
-from asperity.orbit.methods.branch_following import RUNAWAY, continues
+from asperity.orbit.methods.amplitude_continuation import RUNAWAY, continues
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.orbit.search import find_orbits, mark_too_unstable
 from asperity.orbit.solution import Method, SearchOptions, Solution

@@ -1,15 +1,15 @@
 """Continuation of periodic orbits in parameters, their bifurcations, and stability boundaries."""
 
 from asperity._lazy import public_names
+from asperity.branches.boundaries import (
+    BoundaryCurve as BoundaryCurve,
+    StabilityBoundary as StabilityBoundary,
+    stability_boundary as stability_boundary,
+)
 from asperity.branches.branch import Bifurcation as Bifurcation, Branch as Branch
 from asperity.branches.continuation import (
     continuation as continuation,
     doubled_branch as doubled_branch,
-)
-from asperity.branches.stability import (
-    BoundaryCurve as BoundaryCurve,
-    StabilityBoundary as StabilityBoundary,
-    stability_boundary as stability_boundary,
 )
 
 __all__ = public_names(globals())

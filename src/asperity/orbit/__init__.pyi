@@ -1,13 +1,13 @@
 # Public names of the package, each with its module; `asperity._lazy` imports them when used.
 
+from asperity.orbit.derivatives.mesh_search import KnownOrbits as KnownOrbits
+from asperity.orbit.derivatives.parametrised import ResponseValues as ResponseValues
 from asperity.orbit.differentiable import (
     ResponseFunction as ResponseFunction,
     Sensitivities as Sensitivities,
     response_function as response_function,
     sensitivities as sensitivities,
 )
-from asperity.orbit.gradient.parametrised import ResponseValues as ResponseValues
-from asperity.orbit.gradient.search import KnownOrbits as KnownOrbits
 from asperity.orbit.outcome import Outcome as Outcome
 from asperity.orbit.periodic import (
     averaged_response as averaged_response,

@@ -27,9 +27,20 @@ from asperity.laws import Law, get_law
 from asperity.laws.consistency import checked_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
-from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.mesh_derivatives import add_derivatives, searched_values, values_of
-from asperity.orbit.gradient.parametrised import (
+from asperity.orbit.derivatives.fourier_orbits import (
+    FastOrbits,
+    fast_orbits,
+    fast_values,
+    has_fast_method,
+)
+from asperity.orbit.derivatives.mesh_orbits import add_derivatives, searched_values, values_of
+from asperity.orbit.derivatives.mesh_search import (
+    KnownOrbits,
+    SearchedOrbits,
+    growth_of,
+    search_orbits,
+)
+from asperity.orbit.derivatives.parametrised import (
     Parameters,
     ParametrisedProblem,
     Program,
@@ -39,7 +50,6 @@ from asperity.orbit.gradient.parametrised import (
     coefficients_of,
     load_values,
 )
-from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, growth_of, search_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed

@@ -21,12 +21,12 @@ import numpy as np
 from asperity._processes import process_pool
 from asperity.errors import require
 from asperity.orbit.batches import put, run_chunks, take
-from asperity.orbit.methods.branch_following import BranchFollowing
+from asperity.orbit.methods.amplitude_continuation import AmplitudeContinuation
 from asperity.orbit.methods.collocation import Collocation
 from asperity.orbit.methods.fourier import Fourier
-from asperity.orbit.methods.frequency_path import FrequencyPath
+from asperity.orbit.methods.fourier_series import FourierSeries
+from asperity.orbit.methods.frequency_continuation import FrequencyContinuation
 from asperity.orbit.methods.from_transient import SettledMotion
-from asperity.orbit.methods.series import FourierSeries
 from asperity.orbit.methods.shooting import Shooting
 from asperity.orbit.methods.stroboscopic import StroboscopicMap
 from asperity.orbit.outcome import (
@@ -75,8 +75,8 @@ METHODS: tuple[Method, ...] = (
     Collocation(),
     StroboscopicMap(),
     SettledMotion(),
-    BranchFollowing(),
-    FrequencyPath(),
+    AmplitudeContinuation(),
+    FrequencyContinuation(),
 )
 
 #: Names that a user may choose.

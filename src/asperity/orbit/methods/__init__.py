@@ -1,1 +1,1 @@
-"""Methods that find a periodic orbit: Fourier, series, shooting, collocation, branch following."""
+"""Methods that find a periodic orbit: Fourier, shooting, collocation, continuation, transients."""

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Complex, Float, Index
 from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
+from asperity.orbit.derivatives.parametrised import ParametrisedProblem
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
-from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.equations import collocated, mean_and_harmonics, read_orbit
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
+from asperity.orbit.methods.fourier_series import NODES, follows_steady_sliding, series_orbits
 from asperity.orbit.methods.from_transient import settled_orbits
-from asperity.orbit.methods.series import NODES, follows_steady_sliding, series_orbits
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits

@@ -1,4 +1,4 @@
-"""Orbits followed in frequency, from a modulation so fast that the averaged limit holds."""
+"""Continuation in frequency, from a modulation so fast that the averaged limit holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import remeshed
-from asperity.orbit.methods.branch_following import followed_branches
+from asperity.orbit.methods.amplitude_continuation import followed_branches
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit, refined_where_resolved
 from asperity.orbit.outcome import WITHOUT_ORBIT
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -26,10 +26,10 @@ _INTERVALS, _MOST_STEPS = 216, 250
 _rate = jit_large(perturbation_rate)
 
 
-class FrequencyPath(Method):
+class FrequencyContinuation(Method):
     """Orbits of branches that are not connected with steady sliding."""
 
-    name = "frequency path"
+    name = "continuation in frequency"
     choice = "collocation"
 
     def candidates(self, solution: Solution) -> Index:

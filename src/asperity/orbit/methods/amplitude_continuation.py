@@ -1,7 +1,7 @@
-"""Branches of orbits from steady sliding to the requested amplitude, through folds and canards.
+"""Continuation in amplitude, from steady sliding to the requested amplitude, through folds.
 
-`BranchFollowing` is the method of the search that refines the orbit at the end of each branch, or
-reports why the branch ends before the requested amplitude. Branches are followed in batches.
+The method of the search refines the orbit at the end of each branch, or reports why the branch ends
+before the requested amplitude. Branches are followed in batches.
 """
 
 from __future__ import annotations
@@ -308,10 +308,10 @@ def _extremum(pair: PointPair, step: BranchStep, rows: Index, chosen: Index) -> 
     return t + scale * rise
 
 
-class BranchFollowing(Method):
-    """Follows the branch from steady sliding by its arclength, on finer and finer meshes."""
+class AmplitudeContinuation(Method):
+    """Follows branches from steady sliding by their arclength, on finer and finer meshes."""
 
-    name = "branch following"
+    name = "continuation in amplitude"
     choice = "collocation"
 
     def __init__(self, meshes: tuple[BranchMesh, ...] = MESHES) -> None:

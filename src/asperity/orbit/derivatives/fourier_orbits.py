@@ -1,4 +1,4 @@
-"""The fast methods within a compiled program: orbits without derivatives, then their response.
+"""Fourier orbits within a compiled program: the orbits, then their response with derivatives.
 
 Orbits are fixed points of contractions: `asperity.algebra.contraction` has the rule of their
 derivatives. The multipliers are functions of the Jacobian along the orbit.
@@ -18,8 +18,8 @@ from asperity._jax import jit_large
 from asperity.algebra.contraction import contracted, implicit_solution
 from asperity.algebra.mirrored_grid import grid
 from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points
+from asperity.orbit.derivatives.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
-from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.fourier import (
     LARGEST_CONTRACTING_RATE,
     GridEquations,

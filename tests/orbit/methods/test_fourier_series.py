@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.laws import ElastoPlastic, RiceRuina
-from asperity.orbit.methods.series import follows_steady_sliding
+from asperity.orbit.methods.fourier_series import follows_steady_sliding
 from asperity.slider.problem import checked_problem, flatten
 
 MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0

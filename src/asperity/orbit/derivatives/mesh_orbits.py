@@ -27,13 +27,13 @@ from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.arrays import Bool, Complex, Float
 from asperity.orbit.batches import mesh_chunk, run_chunks
-from asperity.orbit.gradient.parametrised import (
+from asperity.orbit.derivatives.mesh_search import MeshOrbits, SearchedOrbits, search_orbits
+from asperity.orbit.derivatives.parametrised import (
     Parameters,
     ParametrisedProblem,
     Program,
     ResponseValues,
 )
-from asperity.orbit.gradient.search import MeshOrbits, SearchedOrbits, search_orbits
 from asperity.orbit.mesh.equations import (
     collocated,
     condensed_jacobian,
