@@ -12,9 +12,9 @@ from scipy.special import stdtrit
 from asperity.arrays import Float
 from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
+from asperity.lock_in.quantisation import rounding_variance, step_of, with_rounding
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
-from asperity.lock_in.rounding import rounding_variance, step_of, with_rounding
 from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
 from asperity.measurement.series import (
     MeanLevel,

@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 from asperity.lock_in.noise import red_exponent
-from asperity.lock_in.rounding import rounding_variance
+from asperity.lock_in.quantisation import rounding_variance
 
 #: Most blocks of a mean level.
 _MOST_BLOCKS = 512

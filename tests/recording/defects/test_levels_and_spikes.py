@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from asperity.recording.defects.check import rows_to_avoid, usable_rows
-from asperity.recording.defects.levels import coarsely_rounded, recorder_step, saturated
+from asperity.recording.defects.resolution import coarsely_rounded, recorder_step
 from asperity.recording.defects.sampling import rate_stretches
+from asperity.recording.defects.saturation import saturated
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
 

@@ -23,8 +23,9 @@ from asperity.measurement.samples import load_channel, shear_channel
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.parameters.arguments import typed
 from asperity.recording import Trace
-from asperity.recording.defects.levels import coarsely_rounded, saturated
+from asperity.recording.defects.resolution import coarsely_rounded
 from asperity.recording.defects.sampling import even_times, rate_stretches
+from asperity.recording.defects.saturation import saturated
 from asperity.recording.readers import read
 from asperity.units import KINDS
 

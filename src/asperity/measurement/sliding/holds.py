@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.lock_in.rounding import rounding_variance
+from asperity.lock_in.quantisation import rounding_variance
 from asperity.measurement.series import (
     bin_means,
     columns,

@@ -35,7 +35,7 @@ from asperity.measurement.verdicts.verdict import SLIDING, Check, Judged
 from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
-from asperity.recording.defects.levels import recorder_step
+from asperity.recording.defects.resolution import recorder_step
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 from asperity.recording.trace import Trace
 

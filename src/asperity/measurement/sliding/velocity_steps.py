@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.lock_in.rounding import rounding_variance
+from asperity.lock_in.quantisation import rounding_variance
 from asperity.measurement.series import (
     Rate,
     TrendFit,

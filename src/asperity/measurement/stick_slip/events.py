@@ -16,7 +16,7 @@ import numpy as np
 from asperity.arrays import Float, Index
 from asperity.measurement.stick_slip.detection import Falls, LineSums
 from asperity.recording.defects.autoregression import Autoregression, fitted
-from asperity.recording.defects.levels import recorder_step
+from asperity.recording.defects.resolution import recorder_step
 
 Shape = Callable[[Float, Float], Float]
 

@@ -23,8 +23,9 @@ from asperity.measurement.verdicts.verdict import STICK_SLIP, Check, Judged, per
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.defects.check import saturation
-from asperity.recording.defects.levels import CROWDED, coarsely_rounded, recorder_step
+from asperity.recording.defects.resolution import coarsely_rounded, recorder_step
 from asperity.recording.defects.sampling import even_rate
+from asperity.recording.defects.saturation import CROWDED
 from asperity.recording.trace import Channel, Trace
 
 _DEFAULTS = Question()

@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtri
 
 from asperity.arrays import Float, Index
-from asperity.recording.defects.levels import recorder_step
+from asperity.recording.defects.resolution import recorder_step
 
 #: Width of a median filter whose output two neighbouring impulses do not change.
 _FILTER = 5

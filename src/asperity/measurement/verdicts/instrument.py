@@ -22,7 +22,7 @@ from asperity.lock_in.reference import strongest_line
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check
 from asperity.measurement.window import LoadInterval
-from asperity.recording.defects.levels import held_length
+from asperity.recording.defects.resolution import held_length
 
 _PIECE = 1 << 16
 #: Mains frequencies (Hz), number of their harmonics, and largest departure of a network (Hz).

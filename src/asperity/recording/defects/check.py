@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from asperity.arrays import Bool, Float, Index
-from asperity.recording.defects.levels import CROWDED, NONE, saturated
 from asperity.recording.defects.sampling import check_sampling, gap_rows
+from asperity.recording.defects.saturation import CROWDED, NONE, saturated
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding, Severity, at_row
 

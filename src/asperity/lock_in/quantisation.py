@@ -1,4 +1,4 @@
-"""Errors of a reading by the steps of a recorder, which noise smooths only if it is as large.
+"""Quantisation error of a reading, by the steps of a recorder and noise finer than a step.
 
 A channel x that is recorded in steps q has the error sum_n (-1)^n q/(pi n) sin(2 pi n x/q). For a
 level with an oscillation of amplitude A at the fundamental and noise of standard deviation s, its
@@ -32,7 +32,7 @@ _SMOOTH = 10.0
 def step_of(values: Float) -> float:
     """Smallest difference between values that differ, (n,); 0 for a constant.
 
-    `asperity.recording.defects.levels.recorder_step` needs repeated samples, which a modulated
+    `asperity.recording.defects.resolution.recorder_step` needs repeated samples, which a modulated
     signal does not have.
     """
     steps = np.diff(np.unique(values[:_SEARCHED]))

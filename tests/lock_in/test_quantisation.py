@@ -5,8 +5,8 @@ import pytest
 from scipy.special import ndtri
 
 import asperity as asp
-from asperity.lock_in import rounding
-from asperity.lock_in.rounding import common_phases, rounding_variance, step_of
+from asperity.lock_in import quantisation
+from asperity.lock_in.quantisation import common_phases, rounding_variance, step_of
 from references.populations import draws
 
 
@@ -105,6 +105,6 @@ def test_uncertainties_include_the_rounding(truth, protocol, trace, monkeypatch,
         return np.sqrt(np.mean(squares))
 
     assert rms_score() < 1.6
-    monkeypatch.setattr(rounding, "step_of", lambda values: 0.0)
+    monkeypatch.setattr(quantisation, "step_of", lambda values: 0.0)
     monkeypatch.setattr("asperity.measurement.measure.step_of", lambda values: 0.0)
     assert rms_score() > 5
