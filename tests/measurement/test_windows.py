@@ -7,7 +7,7 @@ import pytest
 
 import asperity as asp
 from asperity.lock_in.reference import fit_frequency, strongest_line
-from asperity.measurement.series import mean_level, steady_from
+from asperity.measurement.levels_and_trends import mean_level, steady_from
 from asperity.measurement.verdicts.verdict import Limits, worst
 from asperity.measurement.window import clean_run, stretches, whole_periods
 from references.populations import population

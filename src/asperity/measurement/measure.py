@@ -15,8 +15,7 @@ from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.quantisation import rounding_variance, step_of, with_rounding
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
-from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
-from asperity.measurement.series import (
+from asperity.measurement.levels_and_trends import (
     MeanLevel,
     Rate,
     bin_means,
@@ -26,6 +25,7 @@ from asperity.measurement.series import (
     mean_level,
     rate_between,
 )
+from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
 from asperity.measurement.verdicts import checks, instrument, steadiness
 from asperity.measurement.verdicts.checks import drift_rate
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check, Judged

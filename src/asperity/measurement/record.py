@@ -11,8 +11,8 @@ import numpy as np
 from asperity.arrays import Float
 
 if TYPE_CHECKING:
+    from asperity.measurement.levels_and_trends import MeanLevel
     from asperity.measurement.measure import Measurement
-    from asperity.measurement.series import MeanLevel
     from asperity.measurement.sliding.measure import SlidingMeasurement
 
 CONVENTIONS = (

@@ -11,7 +11,7 @@ from asperity.arrays import Float, Index
 from asperity.lock_in.normal_equations import BlockSums, even_step, merged, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
-from asperity.measurement.series import neighbour_scatter
+from asperity.measurement.levels_and_trends import neighbour_scatter
 
 #: Usual number of periods in a block of the envelope, and fewest samples of a block.
 _PERIODS, _SAMPLES = 4, 8

@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import InputError
-from asperity.measurement.series import weighted_mean
+from asperity.measurement.levels_and_trends import weighted_mean
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Channel, Trace

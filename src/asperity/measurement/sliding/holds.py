@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 from asperity.lock_in.quantisation import rounding_variance
-from asperity.measurement.series import (
+from asperity.measurement.levels_and_trends import (
     bin_means,
     columns,
     effective_dof,

@@ -10,8 +10,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument
 from asperity.lock_in.demodulation import DRIFTS
-from asperity.measurement.samples import about_channels, require_stated_load
-from asperity.measurement.series import (
+from asperity.measurement.levels_and_trends import (
     MeanLevel,
     Rate,
     block_means,
@@ -20,6 +19,7 @@ from asperity.measurement.series import (
     slope_of,
     steady_from,
 )
+from asperity.measurement.samples import about_channels, require_stated_load
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
 from asperity.measurement.sliding.segments import (
     Partition,

@@ -19,7 +19,13 @@ import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.errors import require
-from asperity.measurement.series import Rate, bin_means, fit_trend, neighbour_scatter, slope_of
+from asperity.measurement.levels_and_trends import (
+    Rate,
+    bin_means,
+    fit_trend,
+    neighbour_scatter,
+    slope_of,
+)
 from asperity.recording.defects.resolution import recorder_step
 
 #: First sample of a piece, and the sample after its last.

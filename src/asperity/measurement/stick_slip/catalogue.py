@@ -12,7 +12,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import require
 from asperity.measurement.campaign import first_columns
-from asperity.measurement.series import mean_level
+from asperity.measurement.levels_and_trends import mean_level
 from asperity.measurement.stick_slip.threshold import linear_frequency
 from asperity.measurement.verdicts.verdict import doubts_text, percent
 from asperity.outputs import json, written_file

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.measurement.series import weighted_line
+from asperity.measurement.levels_and_trends import weighted_line
 
 #: Fewest recordings for a slope, and most iterations for their scatter about it.
 _FEWEST, _PASSES = 3, 30

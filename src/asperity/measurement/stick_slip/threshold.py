@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.measurement.series import weighted_line, weighted_mean
+from asperity.measurement.levels_and_trends import weighted_line, weighted_mean
 from asperity.measurement.stick_slip.events import SlipEvents
 
 #: Growing or dying cycles are fitted together if their periods exceed those of the smallest cycles

@@ -11,7 +11,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import symbol
 from asperity.lock_in.reading import LockInReading
-from asperity.measurement.series import MeanLevel, Rate
+from asperity.measurement.levels_and_trends import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import other_line
 from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
 from asperity.recording.finding import Finding

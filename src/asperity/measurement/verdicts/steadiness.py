@@ -14,7 +14,7 @@ from scipy.special import fdtri
 from asperity.arrays import Float
 from asperity.lock_in.reading import PIECE, LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
-from asperity.measurement.series import block_means
+from asperity.measurement.levels_and_trends import block_means
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check, percent
 
 #: Stick-slip of laboratory sliders is slower than this (Hz).

@@ -1,4 +1,4 @@
-"""Slow series of a recording: block means, their steady part, levels and trends with uncertainties.
+"""Mean levels and trends of a recording, with uncertainties that count correlated noise.
 
 Friction in a segment is averaged in bins of equal time and fitted by least squares with a level, a
 trend over slip and optionally decaying exponentials. The residual is correlated over hundreds of
