@@ -8,7 +8,8 @@ import pytest
 from scipy.optimize import fsolve
 
 import asperity as asp
-from asperity.branches import bifurcations
+from asperity.branches import follower
+from asperity.branches.continuation import ParameterBranch
 from asperity.branches.parameters import one_problem
 from asperity.errors import InputError
 from asperity.loads import Harmonic
@@ -206,13 +207,13 @@ def test_an_orbit_without_multipliers_is_not_stable(stabilised, rapid, monkeypat
     unknown = np.full_like(stabilised.log_multipliers, np.nan)
     assert not dataclasses.replace(stabilised, log_multipliers=unknown).stable.any()
     # Nor is it a point of a branch: bifurcations next to it would be missed.
-    known, calls = bifurcations.log_multipliers, []
+    known, calls = follower.log_multipliers, []
 
     def lost_after_three(*arrays):
         calls.append(arrays)
         return known(*arrays) * (1.0 if len(calls) <= 3 else np.nan)
 
-    monkeypatch.setattr(bifurcations, "log_multipliers", lost_after_three)
+    monkeypatch.setattr(follower, "log_multipliers", lost_after_three)
     branch = asp.continuation(
         rapid.slider, parameter="epsilon", span=(0, 0.2), velocity="1 um/s", frequency="120 Hz"
     )
@@ -226,7 +227,7 @@ def test_a_bifurcation_that_is_not_located_is_missed_in_words(change):
     fails = SimpleNamespace(crossing=lambda *arguments: None)
     here = SimpleNamespace(t=0.1, unstable=0, direction=1.0)
     there = SimpleNamespace(**{**vars(here), "t": 0.2, **change})
-    branch = bifurcations.ParameterBranch(fails, here, 10)
+    branch = ParameterBranch(fails, here, 10)
     branch.accept(np.arange(1), np.arange(1), SimpleNamespace(next=there, length=np.array([0.1])))
     assert (branch.bifurcations, branch.missed) == ([], [0.1])
 

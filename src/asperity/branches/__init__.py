@@ -7,9 +7,7 @@ from asperity.branches.boundaries import (
     stability_boundary as stability_boundary,
 )
 from asperity.branches.branch import Bifurcation as Bifurcation, Branch as Branch
-from asperity.branches.continuation import (
-    continuation as continuation,
-    doubled_branch as doubled_branch,
-)
+from asperity.branches.continuation import continuation as continuation
+from asperity.branches.period_doubling import doubled_branch as doubled_branch
 
 __all__ = public_names(globals())

@@ -20,14 +20,9 @@ from numpy.typing import NDArray
 
 from asperity.algebra.predictor_corrector import STEPS, STUCK, Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.branches.bifurcations import (
-    BranchFollower,
-    BranchOrbit,
-    Kind,
-    ParameterBranch,
-    criterion,
-    kind_of,
-)
+from asperity.branches.bifurcations import Kind, criterion, kind_of
+from asperity.branches.continuation import ParameterBranch
+from asperity.branches.follower import BranchFollower, BranchOrbit
 from asperity.branches.parameters import (
     ContinuedParameter,
     fixed_parameters,

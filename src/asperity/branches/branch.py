@@ -17,7 +17,7 @@ from asperity.slider.parameters import equations_as_text
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.branches.bifurcations import BranchFollower, BranchOrbit
+    from asperity.branches.follower import BranchFollower, BranchOrbit
     from asperity.branches.parameters import ContinuedParameter
     from asperity.orbit.mesh.arclength import ContinuationPoint
     from asperity.slider.problem import Problem

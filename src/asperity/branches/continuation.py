@@ -1,33 +1,19 @@
-"""Pseudo-arclength continuation of the periodic response in any one parameter.
-
-At a period doubling a branch of doubled period begins. Its orbits have two periods of the
-modulation, and are computed as orbits of one period of a modulation that repeats twice, at half the
-frequency. Where a multiplier of the simple orbit is -1, its eigenvector v changes sign from one
-period to the next: the doubled orbits leave the simple branch in the direction (v, -v).
-
-Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
-"""
+"""Pseudo-arclength continuation of the periodic response in any one parameter."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
+from numpy.typing import NDArray
 
-from asperity.arrays import Float
-from asperity.branches.bifurcations import (
-    INTERVALS,
-    BranchFollower,
-    BranchOrbit,
-    LocatedBifurcation,
-    ParameterBranch,
-    criterion,
-)
+from asperity.algebra.predictor_corrector import STEPS, Attempt, Curves, StepControl, follow
+from asperity.arrays import Float, Index
+from asperity.branches.bifurcations import LocatedBifurcation, bifurcations_between, criterion
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
+from asperity.branches.follower import BranchFollower, BranchOrbit
 from asperity.branches.parameters import (
     ContinuedParameter,
     fixed_parameters,
@@ -35,15 +21,100 @@ from asperity.branches.parameters import (
     moving_parameter,
     one_problem,
 )
-from asperity.errors import InputError, listed, require
-from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.arclength import ContinuationPoint, ParameterLine, slip_units, weighted_row
-from asperity.orbit.mesh.equations import condensed, transfer_maps
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import Change
+from asperity.errors import InputError, listed
+from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import Slider
-from asperity.slider.problem import Problem
+
+#: First step, and longest step, as shares of the span.
+_FIRST, _LARGEST_PART = 1e-3, 0.04
+
+
+class ParameterBranch(Curves):
+    """A branch along a line of parameters, followed until it leaves the span.
+
+    Parameters
+    ----------
+    follower : BranchFollower
+    start : BranchOrbit
+    most_steps : int
+    report : callable, optional
+        Called with 1 after each step.
+
+    Attributes
+    ----------
+    orbits : list of BranchOrbit
+    bifurcations : list of (LocatedBifurcation, int)
+        Those within the span, each with the index of the orbit before it.
+    missed : list of float
+        Values of t after which stability changes at a bifurcation that is not located.
+    last_length : float
+        Length of the last step.
+    """
+
+    control = StepControl(
+        shortest=1e-7,
+        longest=0.25,  # in units of the exponent of the slip rate and of the whole span together
+        growth=1.5,
+        easy=4,
+        hard=6,
+        sharpest_turn=0.7,
+        farthest=np.inf,
+        most_failures=20,
+    )
+
+    def __init__(
+        self,
+        follower: BranchFollower,
+        start: BranchOrbit,
+        most_steps: int,
+        report: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        self.follower, self.most_steps, self.report = follower, most_steps, report
+        self.orbits, self.last_length = [start], 0.0
+        self.bifurcations: list[tuple[LocatedBifurcation, int]] = []
+        self.missed: list[float] = []
+
+    def follow(self) -> str:
+        """Follow the branch; why it ends: "end", "start", "steps" or "stuck"."""
+        (why,) = follow(self, np.array([_FIRST]))
+        return why
+
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """No longer than a part of the span."""
+        return np.minimum(length, _LARGEST_PART / np.maximum(abs(self.orbits[-1].direction), 1e-12))
+
+    def attempts(
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
+        """One step of the arclength."""
+        following, step = self.follower.step(self.orbits[-1].point, float(length[0]))
+        iterations, turn = float(step.iterations[0]), float(step.turn[0])
+        yield rows, Attempt.of_one(following, float(length[0]), iterations=iterations, turn=turn)
+
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
+        """Keep the new orbit and the bifurcations before it; the branch ends outside the span."""
+        here, there, self.last_length = self.orbits[-1], attempt.next, float(attempt.length[0])
+        for located in bifurcations_between(self.follower, here, self.last_length, there):
+            if located is None:
+                self.missed.append(here.t)
+            elif 0 <= located.branch_orbit.t <= 1:
+                self.bifurcations.append((located, len(self.orbits) - 1))
+        self.orbits.append(there)
+        self.report(1)
+        if not 0 <= there.t <= 1:
+            return ["end" if there.t >= 0.5 else "start"]
+        return [STEPS if len(self.orbits) > self.most_steps else ""]
+
+    def cut(self) -> None:
+        """Replace a last orbit outside the span by that at the end of the span."""
+        last = self.orbits[-1]
+        if not 0 <= last.t <= 1:
+            edge = 1.0 if last.t > 1 else 0.0
+            step = self.last_length, last
+            reached = self.follower.crossing(self.orbits[-2], lambda orbit: orbit.t - edge, step)
+            self.orbits[-1] = reached or last
+
 
 _RESULTS = {
     "end": "the branch reaches the end of the span, {value:.6g}{unit}",
@@ -59,7 +130,7 @@ _RESULTS = {
 }
 
 
-def _followed(
+def followed_branch(
     origin: BranchOrigin,
     start: BranchOrbit,
     most_steps: int,
@@ -203,141 +274,4 @@ def continuation(
         got = f"none at {moving.name} = {moving.start:g} {moving.unit}".rstrip()
         advice = "start elsewhere, such as at a small epsilon"
         raise InputError("span", "start where there is a periodic orbit", got, advice)
-    return _followed(BranchOrigin(follower, moving, problem), start, most_steps, progress)
-
-
-#: Distances from the bifurcation at which a doubled orbit is tried (change of the log slip rate).
-_DISTANCES = (0.05, 0.02, 0.1, 0.2)
-
-
-class Repeated(Modulation):
-    """Two periods of a modulation while theta rises from 0 to 2 pi.
-
-    Parameters
-    ----------
-    load : Modulation
-    """
-
-    load: Modulation
-
-    def at(self, theta: ArrayLike) -> Excitation:
-        """Values and slopes at the phase `theta` (rad) of the double period."""
-        once = self.load.at(2 * jnp.asarray(theta))
-        return once._replace(w_slope=2 * once.w_slope, shear_slope=2 * once.shear_slope)
-
-    @property
-    def amplitude(self) -> ArrayLike:
-        """As for the simple modulation."""
-        return self.load.amplitude
-
-    @property
-    def formula(self) -> str:
-        """As for the simple modulation."""
-        return self.load.formula
-
-    def scaled(self, share: ArrayLike) -> Repeated:
-        """The modulation with `share` of its amplitude."""
-        return Repeated(self.load.scaled(share))
-
-
-@typed
-def doubled_branch(
-    branch: Branch,
-    bifurcation: Bifurcation,
-    *,
-    most_steps: Annotated[int, at_least(1)] = 1000,
-    progress: Callable[[int, int], None] | None = None,
-) -> Branch:
-    """Follow the branch of doubled period that leaves a branch at a period doubling.
-
-    Parameters
-    ----------
-    branch : Branch
-        Branch of simple period.
-    bifurcation : Bifurcation
-        A period doubling of the branch.
-    most_steps : int
-    progress : callable, optional
-        Called after each step with the number of steps and `most_steps`.
-
-    Returns
-    -------
-    Branch
-        Its `periods` is 2, its harmonics c_n belong to n f / 2, and its multipliers to two periods.
-        It starts next to the period doubling and is followed within the same span. A doubled branch
-        leaves in two directions, but both have the same orbits, shifted by one period: one
-        direction is followed.
-
-    Raises
-    ------
-    InputError
-        If the bifurcation is no period doubling, the branch has a doubled period already,
-        or there is no doubled orbit next to it.
-
-    Examples
-    --------
-    >>> import asperity as asp
-    >>> pmma = asp.materials.load("bureau2000")
-    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.24 N/um", load=pmma.W0)
-    >>> at = {"velocity": "1 um/s", "frequency": "0.8 Hz"}
-    >>> branch = asp.continuation(slider, parameter="epsilon", span=(0, 0.03), **at)
-    >>> print(asp.doubled_branch(branch, branch.bifurcations[0]))
-    """
-    rule, got = "be a period doubling", f"a {bifurcation.kind}"
-    require(bifurcation.kind == "period doubling", "bifurcation", rule, got, "choose another one")
-    rule = "have the period of the modulation"
-    advice = "follow further doublings in the multipliers of this branch"
-    require(branch.periods == 1, "branch", rule, f"{branch.periods} periods", advice)
-    follower = branch.origin.follower
-    simple = follower.finer(bifurcation.critical.point, INTERVALS)
-    twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
-    start = None
-    if simple is not None:
-        point = _doubling_direction(follower.line, simple.point.orbit, simple.point.t)
-        tried = (twice.step(point, distance)[0] for distance in _DISTANCES)
-        start = next((doubled for doubled in tried if doubled is not None), None)
-    if start is None:
-        rule, got = "have a doubled orbit next to it", "none by Newton's method"
-        raise InputError("bifurcation", rule, got, "continue in another parameter")
-    origin = branch.origin._replace(follower=twice)
-    return _followed(origin, start, most_steps, progress, periods=2)
-
-
-def _doubled_line(line: ParameterLine) -> ParameterLine:
-    def doubled(problem: Problem, factor: float) -> Problem:
-        omega = problem.system.omega * factor
-        system = eqx.tree_at(lambda q: q.omega, problem.system, omega)
-        return Problem(system, Repeated(problem.load))
-
-    # The growth is relative: the halved frequency grows by the same factor.
-    return ParameterLine(
-        doubled(line.origin, 0.5), doubled(line.added, 0.5), doubled(line.growth, 1.0)
-    )
-
-
-def _doubling_direction(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
-    """The simple orbit repeated twice, with the unit direction (v, -v)."""
-    problem = line.at(t)
-    equations = condensed(problem, orbit)
-    maps = np.asarray(transfer_maps(equations.response, orbit.widths, orbit.scheme.b))
-    units = slip_units(problem.system, equations.values)
-    total = np.eye(len(maps))
-    for i in range(maps.shape[2]):
-        total = maps[:, :, i, 0] @ total
-    multipliers, vectors = np.linalg.eig(total)
-    vector = vectors[:, int(np.argmin(np.abs(multipliers + 1)))].real
-    nodes = np.empty(orbit.nodes.shape)
-    for i in range(maps.shape[2]):
-        nodes[:, i, 0] = vector
-        vector = maps[:, :, i, 0] @ vector
-    slopes = 2 * np.einsum("nkcmb,cmb->nkmb", equations.response, nodes)
-    mesh = np.concatenate([orbit.mesh / 2, np.pi + orbit.mesh[1:] / 2])
-    twice = orbit._replace(
-        mesh=mesh,
-        nodes=np.concatenate([orbit.nodes, orbit.nodes], axis=1),
-        slopes=2 * np.concatenate([orbit.slopes, orbit.slopes], axis=2),
-    )
-    nodes = np.concatenate([nodes, -nodes], axis=1)
-    slopes = np.concatenate([slopes, -slopes], axis=2)
-    size = np.sqrt((weighted_row(twice, nodes, units) * nodes).sum())
-    return ContinuationPoint(twice, t, Change(nodes / size, slopes / size, np.zeros(1)), units)
+    return followed_branch(BranchOrigin(follower, moving, problem), start, most_steps, progress)
