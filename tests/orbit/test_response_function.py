@@ -19,8 +19,11 @@ from asperity.laws import (
     registered,
 )
 from asperity.loads import modulated
-from asperity.orbit import Outcome, differentiable
-from asperity.orbit.derivatives import mesh_search as search_module
+from asperity.orbit import Outcome
+from asperity.orbit.derivatives import (
+    mesh_search as search_module,
+    response_function as response_module,
+)
 from asperity.orbit.derivatives.mesh_search import search_orbits
 from asperity.orbit.derivatives.parametrised import ParametrisedProblem
 from asperity.slider import QuasiStatic
@@ -477,7 +480,7 @@ def test_each_orbit_of_the_search_is_differentiated_on_a_mesh_that_resolves_it(m
         searched.extend(orbits.parts)
         return orbits
 
-    monkeypatch.setattr(differentiable, "search_orbits", search)
+    monkeypatch.setattr(response_module, "search_orbits", search)
     monkeypatch.setattr(search_module, "MESHES", (16, 48))
     model = response_function("rice-ruina", harmonics=1)
     values, jacobian = model.value_and_jacobian(parameters)

@@ -2,10 +2,12 @@
 
 from asperity.orbit.derivatives.mesh_search import KnownOrbits as KnownOrbits
 from asperity.orbit.derivatives.parametrised import ResponseValues as ResponseValues
-from asperity.orbit.differentiable import (
+from asperity.orbit.derivatives.response_function import (
     ResponseFunction as ResponseFunction,
-    Sensitivities as Sensitivities,
     response_function as response_function,
+)
+from asperity.orbit.derivatives.sensitivities import (
+    Sensitivities as Sensitivities,
     sensitivities as sensitivities,
 )
 from asperity.orbit.outcome import Outcome as Outcome

@@ -9,7 +9,6 @@ rule at the orbit, whichever method solved for it.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -18,10 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large, spare_mappings
-from asperity.arrays import Bool, Complex, Float
+from asperity.arrays import Float
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.laws.consistency import checked_law
@@ -53,9 +51,8 @@ from asperity.orbit.derivatives.parametrised import (
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import Slider
 from asperity.slider.parameters import law_from
-from asperity.slider.problem import checked_problem, flatten, motion_type
+from asperity.slider.problem import motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
 _FEWEST = 4
@@ -570,123 +567,3 @@ def _without_orbits(parameters: Parameters, program: Program) -> tuple[ResponseV
     table = np.full((len(names), points, program.columns), np.nan)
     outcome = np.full(points, int(Outcome.NO_ORBIT))
     return ResponseValues.of_columns(table[0], outcome, program.harmonics), table
-
-
-#: Points that are differentiated at a time, which bounds the memory.
-_BLOCK = 1024
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """Derivatives at one or many operating points.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency, eta
-        (with radiation damping only), and epsilon or the coefficients of the load.
-    outcome : int array, shape (...)
-        `Outcome` of each point.
-    converged : bool array, shape (...)
-        False where there is no resolved orbit; the derivatives are NaN there.
-    mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
-        d(output)/d(parameter) in SI; phases in rad. NaN to lambda at lambda = 0 with inertia or
-        radiation damping: the equations of rigid asperities do not have it.
-    log_multipliers : complex array, shape (..., states, parameters)
-        Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
-        with the positive argument comes first.
-    """
-
-    parameters: tuple[str, ...]
-    outcome: NDArray[np.int64]
-    mean_friction: Float
-    mu1: Float
-    mu2: Float
-    phase1: Float
-    phase2: Float
-    log_multipliers: Complex
-
-    @property
-    def converged(self) -> Bool:
-        """Whether each point was solved."""
-        return np.asarray(self.outcome == Outcome.CONVERGED)
-
-
-@typed
-def sensitivities(
-    slider: Slider,
-    *,
-    velocity: ArrayLike | str,
-    epsilon: ArrayLike | str | None = None,
-    frequency: ArrayLike | str,
-    modulation: Modulation | None = None,
-    inertia: bool = False,
-    radiation_damping: ArrayLike | str | None = None,
-) -> Sensitivities:
-    """Derivatives of mean, harmonics and multipliers with respect to every parameter.
-
-    Parameters
-    ----------
-    slider : Slider
-        With a rate-dependent law.
-    velocity, epsilon, frequency, modulation, inertia, radiation_damping
-        As in `periodic_response`; arrays broadcast.
-
-    Returns
-    -------
-    Sensitivities
-
-    Raises
-    ------
-    InputError
-        As `periodic_response`; if the law does not depend on the velocity.
-
-    Examples
-    --------
-    >>> import asperity as asp
-    >>> pmma = asp.materials.load("bureau2000")
-    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
-    >>> d = asp.sensitivities(slider, velocity="1 um/s", epsilon=0.24, frequency="120 Hz")
-    >>> dict(zip(d.parameters, d.mean_friction))
-
-    Notes
-    -----
-    As `response_function`, with the parameters of the slider.
-    """
-    problem, shape = flatten(
-        checked_problem(
-            slider,
-            velocity=velocity,
-            epsilon=epsilon,
-            frequency=frequency,
-            modulation=modulation,
-            inertia=inertia,
-            radiation_damping=radiation_damping,
-        )
-    )
-    model = ResponseFunction.of(ParametrisedProblem.of(problem), harmonics=2, multipliers=True)
-    numbers = model.equations.values(problem)
-    points = int(np.prod(shape, dtype=int))
-    blocks = [
-        model.value_and_jacobian({n: v[i : i + _BLOCK] for n, v in numbers.items()})
-        for i in range(0, points, _BLOCK)
-    ]
-    values, derivatives = jax.tree.map(lambda *parts: np.concatenate(parts), *blocks)
-    columns = [_outputs(values, derivatives[name]) for name in model.parameters]
-    table = np.stack(columns, axis=-1).reshape(*shape, -1, len(columns))
-    if "lambda" in model.parameters and not problem.system.has_elastic_asperities:
-        table[..., model.parameters.index("lambda")] = np.nan
-    return Sensitivities(
-        model.parameters,
-        values.outcome.reshape(shape),
-        *(table[..., i, :].real for i in range(5)),
-        log_multipliers=table[..., 5:, :],
-    )
-
-
-def _outputs(values: ResponseValues, change: ResponseValues) -> Complex:
-    """Derivatives of the outputs to one parameter, (points, outputs)."""
-    with np.errstate(all="ignore"):  # NaN without an orbit, and where a harmonic vanishes
-        relative = change.harmonics / values.harmonics
-    growth, turn = relative.real * np.abs(values.harmonics), relative.imag
-    return np.column_stack([change.mean_friction, growth, turn, change.log_multipliers])
