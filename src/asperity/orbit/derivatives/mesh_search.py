@@ -9,7 +9,7 @@ milliseconds a point. Fits call the direct search at the same points again and a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated, NamedTuple
@@ -263,67 +263,93 @@ def search_orbits(
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
-    problem = equations.problem(parameters)
-    points, index = len(wanted), np.flatnonzero(wanted)
-    result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
+    search = _MeshSearch(equations.problem(parameters), harmonics, wanted, known)
+    if direct:
+        search.try_each_point(coarse=coarse, motions=motions, every=every)
+    else:
+        search.try_all_methods()
+    return search.result
 
-    def keep(some: Index, orbits: MeshOrbits) -> None:
-        result.add(some, orbits)
-        if known is not None:
-            known.keep(problem, some, orbits.orbit)
 
-    part, options = take(problem, index), SearchOptions(max(harmonics, 2), intervals=MESHES[0])
-    if not direct:
-        solution = find_orbits(part, options)
+class _MeshSearch:
+    """The inputs of a search, and its orbits so far."""
+
+    def __init__(
+        self, problem: Problem, harmonics: int, wanted: Bool, known: KnownOrbits | None
+    ) -> None:
+        self.problem, self.harmonics, self.known = problem, harmonics, known
+        self.index = np.flatnonzero(wanted)
+        self.result = SearchedOrbits(np.full(len(wanted), int(Outcome.NO_ORBIT)), [])
+        self.part = take(problem, self.index)
+        self.options = SearchOptions(max(harmonics, 2), intervals=MESHES[0])
+
+    def try_all_methods(self) -> None:
+        """Orbits of `find_orbits`, each on the first mesh that agrees with them."""
+        solution = find_orbits(self.part, self.options)
         solved = solution.converged
-        result.outcome[index] = np.where(solved, int(Outcome.NOT_RESOLVED), solution.outcome)
-        numbers = solution.numbers[: 1 + harmonics]
-        rows = np.flatnonzero(solved)
-        for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
+        unresolved = int(Outcome.NOT_RESOLVED)
+        self.result.outcome[self.index] = np.where(solved, unresolved, solution.outcome)
+        rows, numbers = np.flatnonzero(solved), solution.numbers[: 1 + self.harmonics]
+        for some, orbits in followed_orbits(
+            self.part, solution.orbit, rows, self.harmonics, MESHES, numbers
+        ):
             logs = solution.log_multipliers[:, some]
             logs = np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
-            keep(index[some], orbits._replace(log_multipliers=logs))
-        return result
+            self._keep(self.index[some], orbits._replace(log_multipliers=logs))
 
-    ended = np.zeros(points, bool)
+    def try_each_point(self, *, coarse: bool, motions: bool | None, every: bool) -> None:
+        """The initial guesses of a direct search, the cheapest first."""
+        outcome, known = self.result.outcome, self.known
+        # A search without methods marks the points out of range.
+        options = self.options._replace(intervals=0)
+        outcome[self.index] = find_orbits(self.part, options, methods=()).outcome
+        meshes = () if coarse else MESHES
+        motions = not coarse if motions is None else motions
+        follow = partial(self._follow, meshes=meshes, patient=motions)
+        near = np.zeros(len(outcome), bool)
+        if known is not None and known.orbit is not None:
+            rows = self._left()
+            follow(known.orbit, rows[known.known[rows]])
+            near[: known.points] = known.near
+        self._try_series(self._left(but=near), (*meshes, FIRST_MESH)[0], follow)
+        if len(rows := self._left(but=near)):
+            patience = _PATIENCE if coarse else math.inf
+            follow(*orbits_from_averaged_limit(self.problem, rows, patience))
+        hopeless = every and (outcome == Outcome.OUT_OF_RANGE).any()
+        if motions and not hopeless and len(rows := self._left()):
+            settled, periodic = settled_orbits(self.problem, rows, every=every)
+            if len(periodic) >= (len(rows) if every else 1):
+                follow(settled, periodic)
 
-    def left() -> Index:
-        done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
-        return index[~(done | ended[index])]
+    def _try_series(
+        self, rows: Index, intervals: int, follow: Callable[[Orbit, Index], None]
+    ) -> None:
+        """Series under slow modulation, and orbits on a mesh from those that are not exact."""
+        slow = follows_steady_sliding(self.problem, rows)
+        series, exact = series_orbits(self.problem, slow, intervals, _FEW_NODES)
+        read = partial(_numbers, harmonics=self.harmonics)
+        chunk = mesh_chunk(self.problem.system.size)
+        for some, numbers in run_chunks(read, (self.problem, series), exact, chunk):
+            self._keep(some, MeshOrbits(take(series, some), numbers))
+        follow(series, np.setdiff1d(slow, exact))
 
-    # A search without methods marks the points out of range.
-    result.outcome[index] = find_orbits(part, options._replace(intervals=0), methods=()).outcome
-    meshes = () if coarse else MESHES
-    motions = not coarse if motions is None else motions
-
-    def follow(guess: Orbit, rows: Index) -> None:
+    def _follow(self, guess: Orbit, rows: Index, *, meshes: tuple[int, ...], patient: bool) -> None:
+        """Keep the orbits that Newton's method reaches from a guess."""
         for some, orbits in followed_orbits(
-            problem, guess, rows, harmonics, meshes, patient=motions
+            self.problem, guess, rows, self.harmonics, meshes, patient=patient
         ):
-            keep(some, orbits)
+            self._keep(some, orbits)
 
-    rows = left()
-    if known is not None and known.orbit is not None:
-        follow(known.orbit, rows[known.known[rows]])
-        ended[: known.points] = known.near
-    slow = follows_steady_sliding(problem, left())
-    series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0], _FEW_NODES)
-    read = partial(_numbers, harmonics=harmonics)
-    for some, numbers in run_chunks(
-        read, (problem, series), exact, mesh_chunk(problem.system.size)
-    ):
-        keep(some, MeshOrbits(take(series, some), numbers))
-    follow(series, np.setdiff1d(slow, exact))
-    if len(rows := left()):
-        follow(*orbits_from_averaged_limit(problem, rows, _PATIENCE if coarse else math.inf))
-    ended[:] = False
-    rows = left()
-    hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
-    if len(rows) and motions and not hopeless:
-        settled, periodic = settled_orbits(problem, rows, every=every)
-        if len(periodic) >= (len(rows) if every else 1):
-            follow(settled, periodic)
-    return result
+    def _keep(self, rows: Index, orbits: MeshOrbits) -> None:
+        self.result.add(rows, orbits)
+        if self.known is not None:
+            self.known.keep(self.problem, rows, orbits.orbit)
+
+    def _left(self, but: Bool | None = None) -> Index:
+        """Points that have no orbit yet and are not out of range, without those of a mask."""
+        done = np.isin(self.result.outcome, (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
+        done = done if but is None else done | but
+        return self.index[~done[self.index]]
 
 
 def growth_of(
