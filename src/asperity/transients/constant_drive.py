@@ -132,7 +132,9 @@ def drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
 @jax.jit
 def _drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
     def one(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
-        return _drive(QuasiStatic(slider, V, jnp.ones(())), drive, Y)
+        motion = QuasiStatic(slider, V, jnp.ones(()))
+        system = ConstantDrive(motion, None, pull=drive.pull)
+        return _DrivenMotion(system, drive, motion.steady()).from_states(Y)
 
     return jax.vmap(one)(slider, V, drive, Y)
 
@@ -146,7 +148,7 @@ class _Step(NamedTuple):
     h: Array
 
 
-class _Run(NamedTuple):
+class _Progress(NamedTuple):
     """State of the loop over the steps."""
 
     next: _Step
@@ -156,75 +158,78 @@ class _Run(NamedTuple):
     steps: Array
 
 
-def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
-    system = ConstantDrive(motion, None, pull=drive.pull)
-    target = motion.steady()
+class _DrivenMotion(NamedTuple):
+    """One motion under its drive, with the states of steady sliding."""
 
-    def distances(Y: Array) -> Array:
-        off = jnp.abs(motion.force(Y[:-1], system.at(jnp.zeros(()))) - drive.level)
+    system: ConstantDrive
+    drive: Drive
+    steady: Array
+
+    def from_states(self, Y: Array) -> Reached:
+        """Integrate to the end, and locate both crossings."""
+        zero, system = jnp.zeros(()), self.system
+        length = stop_gradient(system.first_length(zero, Y))
+        first = _Step(zero, Y, system.rates(system.at(zero), Y), length)
+        none = first._replace(h=zero)
+        start = _Progress(first, self.distances(Y), (none, none), jnp.asarray(-1), jnp.asarray(0))
+        ended = jax.lax.while_loop(lambda run: run.end < 0, self.step, start)
+        # One loop locates both crossings.
+        steps = jax.tree.map(lambda a, b: jnp.stack([a, b]), *ended.crossed)
+        s, there = jax.vmap(lambda step, n: _located(system, step, lambda Y: self.distances(Y)[n]))(
+            steps, jnp.arange(2)
+        )
+        crossing = ended.end == End.CROSSING
+        return Reached(
+            jnp.where(crossing, steps.t[0] + s[0], ended.next.t),
+            jnp.where(crossing, there[0], ended.next.Y),
+            ended.end,
+            ended.steps,
+            steps.t[1] + s[1],
+            there[1],
+        )
+
+    def distances(self, Y: Array) -> Array:
+        """Numbers that rise through zero at the crossing, and where F/W0 comes near `level`."""
+        system, drive = self.system, self.drive
+        off = jnp.abs(system.motion.force(Y[:-1], system.at(jnp.zeros(()))) - drive.level)
         return stop_gradient(jnp.stack([drive.up * system.log_slip(Y), drive.width - off]))
 
-    def body(run: _Run) -> _Run:
-        t, Y, slope, h = run.next
-        cut = t + h >= drive.until
-        h = jnp.where(cut, drive.until - t, stop_gradient(h))
-        trial = attempt_step(system, t, Y, h, slope, _TOLERANCES, rolled=True)
+    def step(self, run: _Progress) -> _Progress:
+        """Try one step; the next begins at its end, or is shorter if its error was too large."""
+        until, (t, Y, slope, h) = self.drive.until, run.next
+        cut = t + h >= until
+        h = jnp.where(cut, until - t, stop_gradient(h))
+        trial = attempt_step(self.system, t, Y, h, slope, _TOLERANCES, rolled=True)
         good = trial.error < 1
         h_next = stop_gradient(next_length(h, trial, LIMITS))
 
         def accepted(new: Array, old: Array) -> Array:
             return jnp.where(good, new, old)
 
-        now = distances(trial.end)
+        now = self.distances(trial.end)
         rising = good & (run.before < 0) & (now >= 0)
-        this = _Step(t, Y, slope, h)
-        log_slip = stop_gradient(system.log_slip(trial.end))
-        off = jnp.abs(log_slip) + jnp.abs(trial.end[:-1] - target)[1:].sum()
-        lost = ~good & ~(t + h_next > t)
-        end = jnp.select(
-            [
-                rising[0],
-                good & (log_slip > drive.runaway),
-                good & cut,
-                good & (off < drive.steady),
-                lost | (run.steps >= MOST_STEPS),
-            ],
-            [End.CROSSING, End.RUNAWAY, End.TIME, End.STEADY, End.TOO_MANY_STEPS],
-            -1,
+        crossed = tuple(
+            jax.tree.map(lambda a, b, r=r: jnp.where(r, a, b), _Step(t, Y, slope, h), step)
+            for r, step in zip(rising, run.crossed, strict=True)
         )
+        log_slip = stop_gradient(self.system.log_slip(trial.end))
+        off = jnp.abs(trial.end[:-1] - self.steady)[1:].sum()
+        lost = ~good & ~(t + h_next > t)
+        ends = {
+            End.CROSSING: rising[0],
+            End.RUNAWAY: good & (log_slip > self.drive.runaway),
+            End.TIME: good & cut,
+            End.STEADY: good & (jnp.abs(log_slip) + off < self.drive.steady),
+            End.TOO_MANY_STEPS: lost | (run.steps >= MOST_STEPS),
+        }
+        end = jnp.select(list(ends.values()), list(ends), -1)
         next_step = _Step(
-            accepted(jnp.where(cut, drive.until, t + h), t),
+            accepted(jnp.where(cut, until, t + h), t),
             accepted(trial.end, Y),
             accepted(trial.memory, slope),
             h_next,
         )
-        crossed = tuple(
-            jax.tree.map(lambda a, b, r=r: jnp.where(r, a, b), this, step)
-            for r, step in zip(rising, run.crossed, strict=True)
-        )
-        return _Run(next_step, accepted(now, run.before), crossed, end, run.steps + 1)
-
-    zero = jnp.zeros(())
-    first = _Step(
-        zero, Y, system.rates(system.at(zero), Y), stop_gradient(system.first_length(zero, Y))
-    )
-    none = first._replace(h=zero)
-    start = _Run(first, distances(Y), (none, none), jnp.asarray(-1), jnp.asarray(0))
-    run = jax.lax.while_loop(lambda run: run.end < 0, body, start)
-    # One loop locates both crossings.
-    steps = jax.tree.map(lambda a, b: jnp.stack([a, b]), *run.crossed)
-    s, there = jax.vmap(lambda step, n: _located(system, step, lambda Y: distances(Y)[n]))(
-        steps, jnp.arange(2)
-    )
-    crossing = run.end == End.CROSSING
-    return Reached(
-        jnp.where(crossing, steps.t[0] + s[0], run.next.t),
-        jnp.where(crossing, there[0], run.next.Y),
-        run.end,
-        run.steps,
-        steps.t[1] + s[1],
-        there[1],
-    )
+        return _Progress(next_step, accepted(now, run.before), crossed, end, run.steps + 1)
 
 
 def _located(
