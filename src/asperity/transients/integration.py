@@ -234,6 +234,7 @@ class Integration:
     def __post_init__(self) -> None:
         self._choice = MethodChoice(self.motion, self.method)
         self._detector = EventDetector(self.motion, self.thresholds)
+        self._ringless = self._may_leave_out = False
         # Velocity (over V) at which the slider rings while F_i/W swings by 1.
         self._ringing = 0.0
         if isinstance(self.motion, Inertial) and self.method != "explicit":
@@ -261,33 +262,20 @@ class Integration:
 
     def _segment(self, segment: ProgrammeSegment) -> Iterator[SegmentPart]:
         here = self.checkpoint
-        ringless = here.ringless
-        system = self._system(segment, ringless)
+        self._ringless = here.ringless
+        system = self._system(segment)
         start = float(self.programme.starts[here.segment])
         end, lost = _contact(segment, float(self.motion.slider.W0))
         if lost is not None and lost <= here.t:
             yield self._standstill(system, start, Termination("loss of contact", start + lost))
             return
         self._detector.enter(system, start, here.steady)
-        # Its break point may make the slider ring anew.
-        may_leave_out, self._hopeless = self._ringing > 0, 0
-        t, Y = here.t, here.states
-        length = here.length
+        # The break point before a segment may make the slider ring anew.
+        self._may_leave_out, self._hopeless = self._ringing > 0, 0
+        t, Y, length = here.t, here.states, here.length
         while t < end:
-            method = implicit if ringless else self._choice.method
-            interval = Interval(t, Y, length, end, segment.longest_step)
-            chunk, samples = self._advance(method, system, interval)
-            many = not ringless and _steps_left(chunk, t, end) >= _MANY_STEPS
-            if many and may_leave_out:
-                may_leave_out, without = False, self._system(segment, True)
-                trial, trial_samples = self._advance(implicit, without, interval)
-                if _length(trial, t) > _GAIN * _length(chunk, t):
-                    chunk, samples, system, ringless = trial, trial_samples, without, True
-            if not ringless:
-                self._choice.learn(chunk, many)
-            self._count(chunk, implicit if ringless else method, samples if ringless else None)
-            dense_output = DenseOutput.of(chunk)
-            reached = float(chunk.t)
+            chunk, samples = self._advance(segment, t, Y, length, end)
+            dense_output, reached = DenseOutput.of(chunk), float(chunk.t)
             events, termination = self._detector.detect(dense_output, samples)
             if termination is None and lost is not None and reached >= end:
                 termination = Termination("loss of contact", start + lost)
@@ -295,24 +283,52 @@ class Integration:
                 termination = self._detector.underflow(reached, chunk.Y)
             if termination is None:
                 termination = self._out_of_reach(chunk, t, end, start)
+            t, Y, length = reached, np.asarray(chunk.Y), float(chunk.next_length)
+            ends_at, states = reached, Y
             if termination is not None:
                 events = [e for e in events if e.time <= termination.time]
                 events.append(Event(termination.time, termination.kind))
-            ends_at = reached if termination is None else min(termination.time - start, reached)
-            t, Y, length = reached, np.asarray(chunk.Y), float(chunk.next_length)
-            states = Y
-            if termination is not None and len(dense_output.begin):
-                states = dense_output.evaluate(np.array([ends_at]))[:, 0]
+                ends_at = min(termination.time - start, reached)
+                if len(dense_output.begin):
+                    states = dense_output.evaluate(np.array([ends_at]))[:, 0]
             mark = Checkpoint(
                 here.segment, ends_at, states, length,
-                ringless=ringless, steady=self._detector.steady,
+                ringless=self._ringless, steady=self._detector.steady,
             )  # fmt: skip
-            closes = termination is None and reached >= end
+            system, closes = self._system(segment), termination is None and reached >= end
             yield SegmentPart(
                 system, start, dense_output, ends_at, events, termination, closes, mark
             )
             if termination is not None:
                 return
+
+    def _advance(
+        self, segment: ProgrammeSegment, t: float, Y: np.ndarray, length: float, end: float
+    ) -> tuple[StepChunk, MotionSamples]:
+        """The next steps; they leave ringing out where too many of them would resolve it."""
+        interval = Interval(t, Y, length, end, segment.longest_step)
+        method = implicit if self._ringless else self._choice.method
+        chunk, samples = self._steps(method, segment, interval)
+        if not self._ringless:
+            many = _steps_left(chunk, t, end) >= _MANY_STEPS
+            if many and self._may_leave_out:
+                self._may_leave_out, self._ringless = False, True
+                trial = self._steps(implicit, segment, interval)
+                if _length(trial[0], t) > _GAIN * _length(chunk, t):
+                    method, (chunk, samples) = implicit, trial
+                else:
+                    self._ringless = False
+        if not self._ringless:
+            self._choice.learn(chunk, many)
+        self.steps += int(chunk.taken)
+        self.rejected += int(chunk.rejected)
+        self.methods.add(NAMES[method])
+        if self._ringless:
+            rtol, atol = self.tolerances
+            error = atol + rtol * float(np.abs(samples.friction).max())
+            velocity = float(self.motion.V) * self._ringing * error
+            self.unresolved = max(self.unresolved, velocity)
+        return chunk, samples
 
     def _out_of_reach(
         self, chunk: StepChunk, t: float, end: float, start: float
@@ -343,28 +359,16 @@ class Integration:
         events = [Event(termination.time, termination.kind)]
         return SegmentPart(system, start, nothing, here.t, events, termination, False, here)
 
-    def _system(self, segment: ProgrammeSegment, ringless: bool) -> SegmentEquations:
-        return SegmentEquations(self.motion, segment, self._ringing if ringless else 0.0)
+    def _system(self, segment: ProgrammeSegment) -> SegmentEquations:
+        return SegmentEquations(self.motion, segment, self._ringing if self._ringless else 0.0)
 
-    def _advance(
-        self, method: ModuleType, system: SegmentEquations, interval: Interval
+    def _steps(
+        self, method: ModuleType, segment: ProgrammeSegment, interval: Interval
     ) -> tuple[StepChunk, MotionSamples]:
+        system = self._system(segment)
         chunk = method.advance(system, interval, self.tolerances)
         samples, chunk = step_samples(system, chunk), jax.device_get(chunk)
         return chunk, samples
-
-    def _count(
-        self, chunk: StepChunk, method: ModuleType, without_ringing: MotionSamples | None
-    ) -> None:
-        """Add the steps of a chunk, and the velocity of the ringing that they leave out."""
-        self.steps += int(chunk.taken)
-        self.rejected += int(chunk.rejected)
-        self.methods.add(NAMES[method])
-        if without_ringing is not None:
-            rtol, atol = self.tolerances
-            error = atol + rtol * float(np.abs(without_ringing.friction).max())
-            velocity = float(self.motion.V) * self._ringing * error
-            self.unresolved = max(self.unresolved, velocity)
 
 
 def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]:
