@@ -213,28 +213,15 @@ def _prepared(trace: Trace, question: Question) -> _ModulatedRecording:
 
 def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Measurement:
     """One stretch: the longest modulated stretch, or the window, if none is given."""
-    samples, parts, start = recording.samples, recording.parts, recording.frequency
-    question, window = recording.question, recording.question.window
-    if window is None:
-        chosen = part or max(
-            (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
-        )
-        first, stop = clean_run(chosen.first, chosen.stop, samples.defects)
-        inside, degree = slice(first, stop), DRIFTS[question.detrend]
-        first += settled(samples.time[inside], samples.force[inside], start, degree)
-    else:
-        first, stop = _rows_of_window(samples.time, window)
-        # F(0) is that next to the stretch that is read.
-        chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
-    if question.whole_periods:
-        stop = first + whole_periods(samples.time[first:stop], start)
+    samples, parts, question = recording.samples, recording.parts, recording.question
+    chosen, first, stop = _rows_to_read(recording, part)
     cut = slice(first, stop)
     time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
     reading = lock_in(
         time,
         load,
         force,
-        frequency=start,
+        frequency=recording.frequency,
         harmonics=question.harmonics,
         detrend=question.detrend,
         refine=not question.exact_frequency,
@@ -243,7 +230,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     require_stated_load(question.normal_load, reading.W0, samples.unit)
     steps = step_of(load), step_of(force)
     reading = with_rounding(reading, time, load, force, steps)
-    chosen_by = "program" if window is None else "user"
+    chosen_by = "program" if question.window is None else "user"
     before, after = _steady_pauses(*_pauses_around(samples, parts, chosen, reading.W0, steps))
     pauses = [before.rate] if before and before.rate else []
     if before and after:
@@ -291,6 +278,27 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         window=(first, stop),
         chosen_by=chosen_by,
     )
+
+
+def _rows_to_read(
+    recording: _ModulatedRecording, part: LoadInterval | None
+) -> tuple[LoadInterval, int, int]:
+    """The stretch that is read, and its first row and the row after its last one."""
+    samples, parts, question = recording.samples, recording.parts, recording.question
+    time, frequency = samples.time, recording.frequency
+    if question.window is None:
+        modulated = [p for p in parts if p.modulated]
+        chosen = part or max(modulated, key=lambda p: p.stop - p.first)
+        first, stop = clean_run(chosen.first, chosen.stop, samples.defects)
+        inside, degree = slice(first, stop), DRIFTS[question.detrend]
+        first += settled(time[inside], samples.force[inside], frequency, degree)
+    else:
+        first, stop = _rows_of_window(time, question.window)
+        # F(0) is that next to the stretch that is read.
+        chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
+    if question.whole_periods:
+        stop = first + whole_periods(time[first:stop], frequency)
+    return chosen, first, stop
 
 
 def modulation_line(time: Float, load: Float, near: float | None = None) -> SpectralLine:
