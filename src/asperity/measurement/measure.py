@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
@@ -12,32 +11,15 @@ from scipy.special import stdtrit
 from asperity.arrays import Float
 from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
-from asperity.lock_in.quantisation import rounding_variance, step_of, with_rounding
+from asperity.lock_in.quantisation import step_of, with_rounding
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
-from asperity.measurement.levels_and_trends import (
-    MeanLevel,
-    Rate,
-    bin_means,
-    columns,
-    effective_dof,
-    fit_trend,
-    mean_level,
-    rate_between,
-)
+from asperity.measurement.levels_and_trends import MeanLevel, effective_dof, rate_between
 from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
+from asperity.measurement.static_friction import Pause, pauses_around, static_friction
 from asperity.measurement.verdicts import checks, instrument, steadiness
-from asperity.measurement.verdicts.checks import drift_rate
-from asperity.measurement.verdicts.verdict import LOCK_IN, Check, Judged
-from asperity.measurement.window import (
-    LoadInterval,
-    clean_run,
-    settled,
-    settling_from,
-    stretches,
-    under_the_same_load,
-    whole_periods,
-)
+from asperity.measurement.verdicts.verdict import Check, Judged
+from asperity.measurement.window import LoadInterval, clean_run, settled, stretches, whole_periods
 from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
@@ -46,12 +28,6 @@ from asperity.recording.trace import Trace
 _DEFAULTS = Question()
 #: A line this often above its background is a modulation.
 _LINE = 8.0
-#: A drift counts above this multiple of its standard uncertainty.
-_DRIFTS = 3.0
-#: Lowest frequency of the lines that are fitted in a pause, in periods of the pause.
-_PAUSE_PERIODS = 64
-#: Fewest samples of a pause from which a rate is estimated.
-_FEWEST = 64
 #: Pieces of a long recording that are searched for the modulation, samples of a piece, and fewest
 #: periods of a piece, by which the line stands apart from slower motion.
 _PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
@@ -231,7 +207,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     steps = step_of(load), step_of(force)
     reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if question.window is None else "user"
-    before, after = _steady_pauses(*_pauses_around(samples, parts, chosen, reading.W0, steps))
+    before, after = pauses_around(samples, parts, chosen, reading.W0, steps)
     pauses = [before.rate] if before and before.rate else []
     if before and after:
         pauses.append(rate_between(before.force, after.force))
@@ -260,7 +236,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.drift(reading, *levels),
         *_findings(samples, first, stop, [before, after]),
     )
-    static = _static_friction(reading, [b for b in (before, after) if b], pauses)
+    static = static_friction(reading, [b for b in (before, after) if b], pauses)
     doubt = reading.uncertainty("mean_friction")
     dof = effective_dof([(doubt, float(reading.dof[0])), (static[1], static[2])])
     whole = float(np.hypot(doubt, static[1]))
@@ -323,31 +299,7 @@ def modulation_line(time: Float, load: Float, near: float | None = None) -> Spec
     return max(lines, key=lambda line: line.amplitude)
 
 
-class _Pause(NamedTuple):
-    """Levels without modulation next to the stretch that is read."""
-
-    force: MeanLevel
-    load: MeanLevel
-    friction: MeanLevel
-    #: Standard error of the friction by the steps of the recorder, the same in all pauses.
-    rounding: float
-    #: Rate at which the force changes; None of a short pause.
-    rate: Rate | None
-
-
-def _steady_pauses(
-    before: _Pause | None, after: _Pause | None
-) -> tuple[_Pause | None, _Pause | None]:
-    """The two pauses; the second is left out while it recovers from the modulation."""
-    if after and before and before.rate and after.rate:
-        # It drifts, and the pause before the modulation does not.
-        change = after.rate.beyond(before.rate) * (after.force.end - after.force.start)
-        if change > LOCK_IN["transient"][0] * abs(after.force.value):
-            return before, None
-    return before, after
-
-
-def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None]) -> list[Check]:
+def _findings(samples: Samples, first: int, stop: int, sides: list[Pause | None]) -> list[Check]:
     """Findings on the window, and what else is wrong with the pauses that are read."""
     time = samples.time
 
@@ -381,102 +333,3 @@ def _rows_of_window(time: Float, window: tuple[float, float]) -> tuple[int, int]
     advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
     require(stop - first >= 16, "measure.window", rule, got, advice)
     return first, stop
-
-
-def _pauses_around(
-    samples: Samples,
-    parts: list[LoadInterval],
-    chosen: LoadInterval,
-    mean_load: float,
-    steps: tuple[float, float],
-) -> tuple[_Pause | None, _Pause | None]:
-    """The pauses before and after the stretch that is read; `steps` of load and force."""
-    at, most = parts.index(chosen), chosen.stop - chosen.first
-    sides: list[_Pause | None] = [None, None]
-    for side, step in enumerate((-1, 1)):
-        pause = parts[at + step] if 0 <= at + step < len(parts) else None
-        if pause is None or pause.modulated or pause.stop - pause.first < 16:
-            continue
-        first, stop = pause.first, pause.stop
-        # Parts of a pause that are far from the stretch are left out.
-        if step > 0:
-            stop = min(stop, first + 2 * most)
-        else:
-            first = max(first, stop - most)
-        # After a modulation the force recovers.
-        recovers = step > 0 or any(part.modulated for part in parts[: at - 1])
-        if recovers:
-            time = samples.time[first:stop]
-            first += settled(time, samples.force[first:stop], _no_modulation(time), 1)
-        first, stop = under_the_same_load(samples.load, first, stop, mean_load, before=step < 0)
-        if stop - first >= 16:
-            cut = slice(first, stop)
-            values = samples.time[cut], samples.force[cut], samples.load[cut]
-            sides[side] = _pause(*values, steps, recovers=recovers)
-    return sides[0], sides[1]
-
-
-def _no_modulation(time: Float) -> float:
-    """A frequency (Hz) far above the slow motion in a pause."""
-    return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
-
-
-def _pause(
-    time: Float, force: Float, load: Float, steps: tuple[float, float], *, recovers: bool
-) -> _Pause | None:
-    """Levels of a pause; of a force that recovers, the level to which it settles.
-
-    None if that level is not determined.
-    """
-    rate = None
-    if time.size > _FEWEST:
-        at, means = bin_means(time, force)
-        rate = fit_trend(columns(at - at[0], 1), means).rate(1)
-    shift = variance = 0.0
-    settling = settling_from(time, force, _no_modulation(time), 1) if recovers else None
-    if settling is not None and settling.possible:
-        shift, variance = float(settling.shift[0]), float(settling.covariance[0, 0])
-        if settling.present:
-            force = force - settling.at(time - time[0])
-    level, of_load = mean_level(time, force), mean_level(time, load)
-    if settling is not None and settling.possible and settling.present and not settling.determined:
-        limit = LOCK_IN["transient"][0]
-        if abs(settling.amplitude) > limit * abs(level.value):
-            return None
-    of_steps = [
-        float(rounding_variance(step, float(np.std(values)))[0])
-        for step, values in zip(steps, (load, force), strict=True)
-    ]
-    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[1])
-    level = level._replace(value=level.value + shift, uncertainty=float(np.linalg.norm(doubts)))
-    # The ratio has the noise of both channels, less what they share.
-    ratio = level.value / of_load.value
-    noise = mean_level(time, force - ratio * load)
-    doubt = float(np.hypot(noise.uncertainty, np.sqrt(variance))) / abs(of_load.value)
-    rounding = float(np.sqrt(of_steps[1] + ratio**2 * of_steps[0])) / abs(of_load.value)
-    friction = noise._replace(value=ratio, uncertainty=doubt)
-    return _Pause(level, of_load, friction, rounding, rate)
-
-
-def _static_friction(
-    reading: LockInReading, sides: list[_Pause], pauses: list[Rate]
-) -> tuple[float, float, float]:
-    """F(0)/W0, its standard uncertainty, drift between the sides included, and its dof."""
-    if not sides:
-        return np.nan, np.nan, 1.0
-    ratios = [side.friction.value for side in sides]
-    doubts = [side.friction.uncertainty / len(sides) for side in sides]
-    # A drift is somewhere between its ends: an even distribution about the mean.
-    drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
-    if len(sides) == 1:
-        # F(0) at the other end was not recorded, but the force drifts in the window or the pause.
-        level, load = sides[0].force, sides[0].load
-        rates = [*pauses, drift_rate(reading)] if reading.drift.shape[1] else pauses
-        rate = min(rates, key=lambda each: each.uncertainty, default=Rate(0.0, 0.0, 1.0))
-        if abs(rate.value) > _DRIFTS * rate.uncertainty:
-            away = (reading.start + reading.end - level.start - level.end) / 2
-            drifted = abs(rate.value * away / load.value) / np.sqrt(3)
-    parts = [(doubt, side.friction.dof) for doubt, side in zip(doubts, sides, strict=True)]
-    dof = effective_dof([*parts, (float(drifted), 30.0)])
-    whole = np.linalg.norm([*doubts, drifted, max(side.rounding for side in sides)])
-    return float(np.mean(ratios)), float(whole), dof
