@@ -8,24 +8,21 @@ import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError
-from asperity.measurement.samples import about_channels, require_stated_load
+from asperity.measurement.samples import require_stated_load
 from asperity.measurement.sliding.signals import (
     SlidingSignals,
     sliding_signals,
     with_normalised_force,
 )
+from asperity.measurement.stick_slip.checks import checks_of
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
-from asperity.measurement.stick_slip.regimes import Regime, loading_changes, regimes
-from asperity.measurement.verdicts.checks import findings
-from asperity.measurement.verdicts.verdict import STICK_SLIP, Check, Judged, percent
+from asperity.measurement.stick_slip.regimes import Regime, regimes
+from asperity.measurement.verdicts.verdict import Check, Judged
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
-from asperity.recording.defects.check import saturation
-from asperity.recording.defects.resolution import coarsely_rounded, recorder_step
 from asperity.recording.defects.sampling import even_rate
-from asperity.recording.defects.saturation import CROWDED
 from asperity.recording.trace import Channel, Trace
 
 _DEFAULTS = Question()
@@ -35,14 +32,8 @@ _FEW = 2
 SLIDER = 0.5
 #: Evidence of `Falls` in a recording of many slips.
 _MANY_SLIPS = 3
-#: Events below this multiple of the smallest detectable drop show that smaller ones may be missing.
-_NEAR = 1.5
 #: Longest interval between two samples that a straight line bridges, over the usual interval.
 _LONGEST_GAP = 4.0
-#: Above this ratio of the samples at the extreme level of the recorder to those at the next level,
-#: the signal is saturated. Straight loading fills all levels alike: of 480 extremes of simulated
-#: recordings without saturation, 474 stay below; the other 6 have three samples or fewer.
-_CROWDED = 1.5
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
 
@@ -181,28 +172,19 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     signals = _at_even_times(sliding_signals(trace, question.load, question.force, question.window))
     time = signals.time
     friction, impulses = without_impulses(signals.friction)
-    noise = estimate(friction)
-    falls, upside_down = find_falls(friction, noise), False
-    if falls.evidence < _MANY_SLIPS:
-        other = find_falls(-friction, noise)
-        # A negative mean is due to the sign of the gauge or to its zero; a few slips decide.
-        enough = 1 if signals.turned else _MANY_SLIPS - 1
-        upside_down = other.evidence > max(falls.evidence, enough)
-        if upside_down:
-            friction, falls = -friction, other
+    friction, falls, upside_down = _slips_downwards(friction, signals.turned)
     events = read_events(time, friction, falls)
     machine = _machine(question, signals, events)
     slope, slope_uncertainty = _loading(events)
     smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
     K, _, M, _ = machine.numbers
-    share = impulses.size / time.size
     parts = regimes(
         time,
         friction,
         events,
         smallest,
         falls=len(falls),
-        impulses=share,
+        impulses=impulses.size / time.size,
         natural_period=2 * np.pi * float(np.sqrt(M / K)),
     )
     slip_share = _slip_share(signals, events)
@@ -227,30 +209,21 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
         names=signals.names,
         checks=(),
     )
-    about = [
-        f for f in about_channels(trace, signals.names) if f.name not in ("spike", "saturation")
-    ]
-    about += signals.signs
-    crowded = _CROWDED if any(regime.sticks for regime in parts) else CROWDED
-    for name in signals.names:
-        cut_off = saturation(trace.channel(name).values, trace.time, name, crowded)
-        about += [f for f in cut_off if f.name == "saturation"]
-    checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
-    if signals.turned or upside_down:
-        text = (
-            "the force is recorded with the opposite sign, with which it falls slowly and rises "
-            "fast; its sign was reversed"
-            if signals.turned != upside_down
-            else "the force is negative on average, but rises slowly and falls fast: drops are "
-            "right, but forces before and after a drop lack the zero of the gauge"
-        )
-        checks.append(STICK_SLIP.check("sign", 1.0, text))
-    steps = coarsely_rounded(signals.friction)
-    if steps and len(events):
-        coarse = steps[1] / float(np.median(events.drop))
-        text = f"the recorder's steps, {steps[1]:.2g}, are {percent(coarse)} of the median drop"
-        checks.append(STICK_SLIP.check("resolution", coarse, text))
+    checks = checks_of(result, trace, signals, upside_down=upside_down)
     return replace(result, checks=tuple(checks))
+
+
+def _slips_downwards(friction: Float, turned: bool) -> tuple[Float, Falls, bool]:
+    """Friction that falls in slips, its falls, and whether its sign was reversed for that."""
+    noise = estimate(friction)
+    falls = find_falls(friction, noise)
+    if falls.evidence < _MANY_SLIPS:
+        other = find_falls(-friction, noise)
+        # A negative mean is due to the sign of the gauge or to its zero; a few slips decide.
+        enough = 1 if turned else _MANY_SLIPS - 1
+        if other.evidence > max(falls.evidence, enough):
+            return -friction, other, True
+    return friction, falls, False
 
 
 def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
@@ -359,149 +332,3 @@ def _recorded_slip(time: Float, displacement: Float, events: SlipEvents) -> tupl
     width = np.maximum((end - onset) / 4, 1.0)
     slip = mean(end + 1, end + 1 + width) - mean(onset - width, onset)
     return slip, steepest_fall(-forward, onset, end, slip) / step
-
-
-def _stick_lines(events: SlipEvents, after: Index, time: Float) -> Float:
-    """Force on the line of the stick that ends in each event `after`, at times (s)."""
-    ahead = events.force_before[after] + events.creep[after]
-    return np.asarray(ahead + events.loading_slope[after] * (time - events.onset[after]))
-
-
-def _ringing(result: StickSlipMeasurement, after: Index) -> float:
-    """Largest mean departure of the force after slips from the lines of the sticks, over the drop.
-
-    The departures are means over a quarter of the slip duration, within three slip durations after
-    the end, averaged over all events. A gauge that rings as slowly as the slider slips bends the
-    lines that give drops and ends.
-    """
-    events, (time, force) = result.events, (result.time, result.friction)
-    width = max(float(np.median(events.slip_duration)) / 4, 2 * (time[1] - time[0]))
-    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-    # One row for each time after the slip, one column for each stick.
-    edges = events.end[after - 1] + width * np.arange(13)[:, None]
-    at = np.searchsorted(time, edges)
-    count = np.diff(at, axis=0)
-    mean = np.diff(total[at], axis=0) / np.maximum(count, 1) + force.mean()
-    off = mean - _stick_lines(events, after, (edges[1:] + edges[:-1]) / 2)
-    quarter = events.stick_duration[after] / 4
-    inside = (edges[1:] <= events.end[after - 1] + quarter) & (count > 0)
-    largest = 0.0
-    for column, known in zip(off, inside, strict=True):
-        values = column[known]
-        error = float(np.std(values) / np.sqrt(values.size)) if values.size > _FEW else np.inf
-        usual = abs(float(np.mean(values))) if values.size else 0.0
-        largest = max(largest, usual if usual >= 4 * error else 0.0)
-    return largest / float(np.median(events.drop))
-
-
-def _undetected_share(result: StickSlipMeasurement, after: Index) -> tuple[float, float]:
-    """Share of the loading that undetected small events release, and its standard error.
-
-    If such events are few, sticks load less in their first half than their slope predicts; creep
-    acts in the second half. If they are many, they lower the slope of every stick. Differences
-    between neighbouring means in the middle half of a stick then show them: their median is that
-    of the loading alone, because noise is symmetrical, and their mean includes the falls. The
-    result is the most significant of these estimates over all widths of means; NaN with few sticks.
-    """
-    events, time, force = result.events, result.time, result.friction
-    if after.size < STICK_SLIP["events"][1] or not result.loading_slope > 0:
-        return np.nan, np.nan
-    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-    begin, end, half = events.end[after - 1], events.onset[after], events.stick_duration[after] / 2
-    first, stop = np.searchsorted(time, [begin + half / 2, end - half / 2])
-    rise = _stick_lines(events, after, begin + half) - events.force_after[after - 1]
-    load = result.loading_slope * half
-    lack = 1 - rise.sum() / load.sum()
-    off = rise - (1 - lack) * load
-    best = float(lack), float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
-    rounding = recorder_step(force) / np.sqrt(12.0)
-    for share in (8, 16, 32):
-        width = int(np.median(stop - first)) // share
-        if not width:
-            break
-        at = np.arange(0, time.size - 2 * width, max(width // 4, 1))
-        owner = np.searchsorted(first, at, side="right") - 1
-        at = at[(owner >= 0) & (at + 2 * width < stop[owner])]
-        change = total[at + 2 * width] - 2 * total[at + width] + total[at]
-        usual, spread = np.median(change), np.diff(np.quantile(change, [0.16, 0.84]))[0] / 2
-        # The median of n normal values less their mean scatters by sqrt((pi/2 - 1)/n). Eight
-        # overlapping differences count as one. Sums are whole steps of the recorder.
-        error = np.hypot(spread * np.sqrt((np.pi / 2 - 1) * 8 / at.size), rounding)
-        if usual > 0 and (usual - change.mean()) * best[1] > best[0] * error:
-            best = float(1 - change.mean() / usual), float(error / usual)
-    return best
-
-
-def _checks(result: StickSlipMeasurement) -> list[Check]:
-    events, count, least = result.events, len(result.events), result.smallest_drop
-    checks: list[Check] = []
-
-    def ask(name: str, number: float, sentence: str, doubt: str = "", error: float = 0.0) -> None:
-        check = STICK_SLIP.check(name, number, sentence, significant=not abs(number) < 3 * error)
-        checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
-
-    text = f"{count} complete event{'' if count == 1 else 's'}"
-    ask("events", count, text, "; means and spreads of so few events are uncertain")
-    open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
-    kind = result.kind
-    for regime in open_[:1]:
-        kind = (
-            f"cannot tell the regime from {regime.start:.4g} to {regime.end:.4g} s: "
-            f"{regime.evidence}"
-        )
-    # The measured drop of a sine is a third too small: a sine has no stick before the slip.
-    swings = [regime for regime in result.regimes if regime.kind.startswith("oscillation")]
-    doubt = "; its cycles have no sticks, so that drops and durations of slips do not apply"
-    ask("regime", len(open_) + len(swings), kind, doubt if swings and not open_ else "")
-    if not count:
-        return checks
-    changes = int(np.count_nonzero(loading_changes(events.loading_slope)))
-    text = f"the loading slope changes {changes} times"
-    doubt = (
-        ", as velocity or stiffness does; V, slope and means are those of all cycles: give a window"
-    )
-    ask("loading", changes, text, doubt)
-    drop = float(np.median(events.drop))
-    step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
-    near = float(np.mean(events.drop < _NEAR * least))
-    text = (
-        f"drops below {least:.2g}, {percent(least / drop)} of the median, may not be detected; "
-        f"{percent(near)} of the events are smaller than {_NEAR:g} times this limit"
-    )
-    ask("threshold", near, text, ": some events below the limit may be missing")
-    fast = float(np.mean(events.slip_duration < 2 * step))
-    text = (
-        f"{percent(fast)} of the slips last for less than two samples: their durations and "
-        "velocities are bounds; a higher sampling rate resolves them"
-    )
-    ask("sampling", fast, text)
-    drift = float(np.ptp(events.force_before + events.force_after)) / 2 / drop
-    ask("drift", drift, f"the middle of the drops varies along the track by {drift:.2g} drops")
-    trains = [np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks]
-    after = np.concatenate([np.empty(0, np.intp), *trains])
-    if after.size:
-        ringing = _ringing(result, after)
-        text = (
-            "after a slip the mean force departs from the line of the stick by up to "
-            f"{percent(ringing)} of the drop"
-        )
-        doubt = (
-            ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
-            "much"
-        )
-        ask("ringing", ringing, text, doubt)
-    hidden, error = _undetected_share(result, after)
-    if np.isfinite(hidden):
-        than = f"{percent(abs(hidden))} {'less' if hidden > 0 else 'more'} than"
-        text = f"the mean loading of the sticks is {than} the usual loading"
-        doubt = ": small events are missing, or drops are measured too small"
-        ask("hidden events", hidden, text, doubt, error)
-    stiffness, error = result.stiffness_from_slope
-    given = result.machine.stiffness
-    if given is not None and np.isfinite(stiffness):
-        text = (
-            f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
-            f"{error:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m"
-        )
-        ask("stiffness", abs(stiffness / given - 1), text, error=error / given)
-    return checks
