@@ -219,100 +219,19 @@ def compare(
     rule = "be two or more"
     require(len(set(laws)) >= 2, "laws", rule, ", ".join(laws) or "none", "name those to compare")
     laws = tuple(dict.fromkeys(laws))
-    # Only parameters of laws: the fit checks those of machine and runs, and unknown names.
-    of_any_law = {p for law in registered() for p in _parameters(law)}
-    of_these = {p for law in laws for p in _parameters(law)}
-    of_others = {law: of_these - set(_parameters(law)) for law in laws}
-    nobodys = [p for p in free or () if p in of_any_law - of_these]
-    if nobodys:
-        rule = "be parameters of the laws that are compared"
-        got = f"'{symbol(nobodys[0])}', which none of {', '.join(laws)} has"
-        raise InputError("free", rule, got, "leave it out, or add a law with it")
+    _require_parameters_of(laws, free or ())
     several = listed_data(data, options.get("runs") or RunOptions())
-    free_by_law = {
-        name: (
-            free_by_default(get_law(name), several, options.get("fixed"), options.get("material"))
-            if free is None
-            else [p for p in free if p not in of_others[name]]
-        )
-        for name in laws
-    }
-    # Each law takes the numbers that it has; an empty mapping means the same as None.
-    given = {key: options.pop(key, None) or {} for key in ("fixed", "start", "prior")}
-    if isinstance(given["prior"], Material):
-        every = list(dict.fromkeys(n for names in free_by_law.values() for n in names))
-        given["prior"] = material_priors(given["prior"], every)
-    # Parameters of each law that may take any value, as that of a special case.
-    open_by_law = {name: {*names} - {*given["prior"]} for name, names in free_by_law.items()}
-    not_compared: dict[str, str] = {}
+    law_fits = _LawFits.of(laws, several, free, options)
+    parts = 2 if evidence else 1
 
-    def extended(law: str, others: Iterable[str]) -> bool:
-        """Whether one of the other laws extends a law by parameters that may be zero."""
-        more = ((get_law(n), open_by_law[n]) for n in others)
-        own, chosen = set(_parameters(law)), get_law(law)
-        return any(extends(m, chosen) and {*law_parameters(m)} - own <= free for m, free in more)
-
-    work = _STEPS * len(free_by_law) * (2 if evidence else 1)
-
-    def report(laws: float) -> None:
+    def report(done: float) -> None:
         if progress is not None:
-            progress(round(_STEPS * laws), work)
+            progress(round(_STEPS * done), _STEPS * len(laws) * parts)
 
-    def fits_to(
-        data: Sequence[Any],
-        report: Report,
-        before: Mapping[str, Fit] | None = None,
-    ) -> dict[str, Fit]:
-        done: dict[str, Fit] = {}
-        # Special cases are fitted before the laws that contain them, whose fits start there.
-        ordered = sorted(free_by_law.items(), key=lambda pair: len(_parameters(pair[0])))
-        ordered = [pair for pair in ordered if before is None or pair[0] in before]
-        for k, (name, names) in enumerate(ordered):
-            mine: dict[str, Any] = {
-                key: {n: value for n, value in values.items() if n not in of_others[name]}
-                for key, values in given.items()
-            }
-            if before and before[name].converged:
-                # Nearly the same data, or the lower minimum of a law that extends this one.
-                mine["start"] = {n: before[name].values[n] for n in names}
-                far_off = before[name].law != name and before[name].p_value < FAR_OFF
-                most = 0 if far_off else _STARTS_WITHOUT_OUTLIERS
-                mine["starts"] = min(most, options.get("starts", most))
-            internal: dict[str, Any] = {
-                "bare": True,
-                "simpler": list(done.values()),
-                # The search of a law that extends this one finds its minima too, see below.
-                "further": not extended(name, dict(ordered[k + 1 :])),
-                "check_stiffness": False,
-                "progress": lambda done, total, k=k: report(k + done / total),
-            }
-            try:
-                result = fit(data, name, names, **internal, **{**options, **mine})
-                _require_aicc(result)
-                done[name] = result
-            except UnfittableLawError as error:
-                not_compared[name] = str(error)
-            report(k + 1)
-        return done
-
-    def best_fits(
-        data: Sequence[Any],
-        report: Report,
-        before: Mapping[str, Fit] | None = None,
-    ) -> dict[str, Fit]:
-        fits = fits_to(data, report, before)
-        # A law is searched for further minima by itself if no law that extends it has a fit.
-        fitted = [name for name, f in fits.items() if f.converged]
-        tried = free_by_law if before is None else before
-        alone = {n: f for n, f in fits.items() if extended(n, tried) and not extended(n, fitted)}
-        if missed := alone | _better_at_extension(fits):
-            fits |= fits_to(data, lambda _: None, missed)
-        return fits
-
-    fits = best_fits(several, report)
+    fits = law_fits.best(several, report)
     if len(fits) < 2:
-        rule, reasons = "be two or more that can be fitted to these data", not_compared.values()
-        raise InputError("laws", rule, len(fits), "; ".join(reasons))
+        rule, reasons = "be two or more that can be fitted to these data", law_fits.not_compared
+        raise InputError("laws", rule, len(fits), "; ".join(reasons.values()))
     result = judge(fits)
     outliers = _common_outliers(fits)
     if outliers:
@@ -320,9 +239,10 @@ def compare(
         holds = [d for d in several if isinstance(d, HealingTable)]
         table = joined(tables)[0] if tables else joined_holds(holds)
         out = np.isin(np.arange(table.rows), outliers)
-        rest = judge(best_fits([table.without(out)], lambda _: None, fits))
+        rest = judge(law_fits.best([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())
     doubt, stretches = _support(result)
+    not_compared = law_fits.not_compared
     # The table has the reason for each law.
     lacking = (
         f" Not compared: {enumerated(list(not_compared))}, because a number is neither free nor "
@@ -330,9 +250,133 @@ def compare(
     ) * bool(not_compared)
     judgement = doubt + result.judgement + stretches + _with_free_stiffness(result) + lacking
     result = replace(result, not_compared=not_compared, judgement=judgement)
-    return (
-        _with_evidence(result, lambda laws: report(len(free_by_law) + laws)) if evidence else result
-    )
+    return _with_evidence(result, lambda done: report(len(laws) + done)) if evidence else result
+
+
+def _require_parameters_of(laws: Sequence[str], free: Sequence[str]) -> None:
+    """Refuse free parameters that only other laws have; the fit checks all other names."""
+    of_any_law = {p for law in registered() for p in _parameters(law)}
+    of_these = {p for law in laws for p in _parameters(law)}
+    nobodys = [p for p in free if p in of_any_law - of_these]
+    if nobodys:
+        rule = "be parameters of the laws that are compared"
+        got = f"'{symbol(nobodys[0])}', which none of {', '.join(laws)} has"
+        raise InputError("free", rule, got, "leave it out, or add a law with it")
+
+
+@dataclass
+class _LawFits:
+    """Fits of several laws, each with those free parameters and numbers that it has.
+
+    Attributes
+    ----------
+    free : dict of str to list of str
+        Free parameters of each law.
+    of_others : dict of str to set of str
+        For each law, the parameters that only others of these laws have.
+    numbers : dict of str to dict
+        The arguments "fixed", "start" and "prior" of `fit`.
+    options : dict
+        Its other arguments.
+    not_compared : dict of str to str
+        Laws that could not be fitted, with the reasons.
+    """
+
+    free: dict[str, list[str]]
+    of_others: dict[str, set[str]]
+    numbers: dict[str, Mapping[str, Any]]
+    options: dict[str, Any]
+    not_compared: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        laws: Sequence[str],
+        data: Sequence[Any],
+        free: Sequence[str] | None,
+        options: Mapping[str, Any],
+    ) -> _LawFits:
+        """From the arguments of `compare`."""
+        of_these = {p for law in laws for p in _parameters(law)}
+        of_others = {law: of_these - set(_parameters(law)) for law in laws}
+        fixed, material = options.get("fixed"), options.get("material")
+        free_by_law = {
+            name: (
+                free_by_default(get_law(name), data, fixed, material)
+                if free is None
+                else [p for p in free if p not in of_others[name]]
+            )
+            for name in laws
+        }
+        others = dict(options)
+        # An empty mapping means the same as None.
+        numbers = {key: others.pop(key, None) or {} for key in ("fixed", "start", "prior")}
+        if isinstance(numbers["prior"], Material):
+            every = list(dict.fromkeys(n for names in free_by_law.values() for n in names))
+            numbers["prior"] = material_priors(numbers["prior"], every)
+        return cls(free_by_law, of_others, numbers, others)
+
+    def best(
+        self, data: Sequence[Any], report: Report, before: Mapping[str, Fit] | None = None
+    ) -> dict[str, Fit]:
+        """Fits of the laws, or of those in `before`, from where these begin."""
+        fits = self._fitted(data, report, before)
+        # A law is searched for further minima by itself if no law that extends it has a fit.
+        converged = [name for name, f in fits.items() if f.converged]
+        tried = self.free if before is None else before
+        alone = {
+            n: f
+            for n, f in fits.items()
+            if self._extended(n, tried) and not self._extended(n, converged)
+        }
+        if missed := alone | _better_at_extension(fits):
+            fits |= self._fitted(data, lambda _: None, missed)
+        return fits
+
+    def _fitted(
+        self, data: Sequence[Any], report: Report, before: Mapping[str, Fit] | None
+    ) -> dict[str, Fit]:
+        done: dict[str, Fit] = {}
+        # Special cases are fitted before the laws that contain them, whose fits start there.
+        names = sorted(self.free, key=lambda name: len(_parameters(name)))
+        names = [name for name in names if before is None or name in before]
+        for k, name in enumerate(names):
+            arguments: dict[str, Any] = {
+                key: {n: value for n, value in values.items() if n not in self.of_others[name]}
+                for key, values in self.numbers.items()
+            }
+            if before and before[name].converged:
+                # Nearly the same data, or the lower minimum of a law that extends this one.
+                arguments["start"] = {n: before[name].values[n] for n in self.free[name]}
+                far_off = before[name].law != name and before[name].p_value < FAR_OFF
+                most = 0 if far_off else _STARTS_WITHOUT_OUTLIERS
+                arguments["starts"] = min(most, self.options.get("starts", most))
+            internal: dict[str, Any] = {
+                "bare": True,
+                "simpler": list(done.values()),
+                # The search of a law that extends this one finds its minima too, see `best`.
+                "further": not self._extended(name, names[k + 1 :]),
+                "check_stiffness": False,
+                "progress": lambda part, total, k=k: report(k + part / total),
+            }
+            try:
+                result = fit(data, name, self.free[name], **internal, **self.options | arguments)
+                _require_aicc(result)
+                done[name] = result
+            except UnfittableLawError as error:
+                self.not_compared[name] = str(error)
+            report(k + 1)
+        return done
+
+    def _extended(self, law: str, others: Iterable[str]) -> bool:
+        """Whether one of the other laws extends a law by free parameters that may be zero."""
+        chosen, own = get_law(law), set(_parameters(law))
+        for name in others:
+            # A parameter with a prior cannot take any value, such as that of a special case.
+            may_be_zero = set(self.free[name]) - set(self.numbers["prior"])
+            if extends(get_law(name), chosen) and set(_parameters(name)) - own <= may_be_zero:
+                return True
+        return False
 
 
 def _require_aicc(fit: Fit) -> None:
