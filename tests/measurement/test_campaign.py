@@ -11,7 +11,8 @@ import xarray as xr
 
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
-from asperity.measurement.campaign import conditions_of, labelled_rows, run_campaign, sliding_rows
+from asperity.measurement.campaign import labelled_rows, run_campaign, sliding_rows
+from asperity.measurement.conditions import conditions_of
 from asperity.measurement.measure import measure_amplitudes
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.outputs import Interrupted

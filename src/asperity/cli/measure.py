@@ -62,7 +62,8 @@ class FileRows:
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; a single row with the reason if it cannot be measured."""
-        from asperity.measurement.campaign import MACHINE_FIELDS, failed_row
+        from asperity.measurement.campaign import failed_row
+        from asperity.measurement.conditions import MACHINE_FIELDS
         from asperity.measurement.from_file import measured_parts
         from asperity.measurement.report import measured_rows
         from asperity.recording.readers.from_file import read_source
@@ -318,7 +319,7 @@ def _file_rows(
     recordings: tuple[Path, ...], source: Source, question: Question, conditions: str | None
 ) -> FileRows:
     """The function that measures each file; its arguments are checked before files are read."""
-    from asperity.measurement.campaign import MACHINE_FIELDS, conditions_of
+    from asperity.measurement.conditions import MACHINE_FIELDS, conditions_of
 
     if conditions is None:
         return FileRows(source, question)
@@ -460,7 +461,7 @@ def _campaign(
 
 def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """Numbers of the machine from ``--set``, by the fields of the question."""
-    from asperity.measurement.campaign import MACHINE_FIELDS
+    from asperity.measurement.conditions import MACHINE_FIELDS
 
     rule, like = f"name one of {symbols(MACHINE_FIELDS)}", f'like --set "{symbol("K")}=168 N/m"'
     for name in given if strict else ():

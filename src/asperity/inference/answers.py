@@ -24,7 +24,7 @@ from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law, known_law, registered
-from asperity.measurement.campaign import MACHINE_FIELDS
+from asperity.measurement.conditions import MACHINE_FIELDS
 from asperity.measurement.from_file import reads_cycles
 from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
