@@ -8,7 +8,8 @@ from scipy.signal import lfilter
 
 import asperity as asp
 from asperity.errors import InputError
-from asperity.measurement.sliding.segments import displacement_noise, partition
+from asperity.measurement.sliding.change_points import displacement_noise
+from asperity.measurement.sliding.segments import partition
 from references.populations import population
 from references.spring_slider import pulled_in_parts
 

@@ -17,7 +17,7 @@ from asperity.errors import InputError, require
 from asperity.inference.runs.recorded_drive import recorded_load
 from asperity.inference.runs.run import STIFFNESS
 from asperity.inference.unknowns import Prior
-from asperity.measurement.sliding.segments import displacement_noise
+from asperity.measurement.sliding.change_points import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.parameters.arguments import rising, typed
 from asperity.recording import Trace

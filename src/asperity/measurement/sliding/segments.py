@@ -1,12 +1,10 @@
 """Segments of constant pulling velocity: where the velocity steps, and where the drive holds.
 
-Within a segment the displacement is a straight line, and a parabola while the motor changes its
-velocity; the residual is noise of known strength. The means of the displacement over short blocks
-are cut into such pieces by optimal partitioning (Killick, Fearnhead and Eckley, J. Am. Stat. Assoc.
-107, 1590, 2012), which is exact for this model. The model leaves out that a motor does not run
-evenly and needs time to change its velocity. Therefore neighbouring pieces of nearly the same
-velocity become one segment, and short pieces between two segments become a transition between them.
-A cut lies where the lines on its two sides intersect.
+The displacement is cut into lines and parabolas by `asperity.measurement.sliding.change_points`,
+whose model leaves out that a motor does not run evenly and needs time to change its velocity.
+Therefore neighbouring pieces of nearly the same velocity become one segment, and short pieces
+between two segments become a transition between them. A cut lies where the lines on its two sides
+intersect.
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from asperity.arrays import Float, Index
+from asperity.arrays import Float
 from asperity.errors import require
 from asperity.measurement.levels_and_trends import (
     Rate,
@@ -26,22 +24,15 @@ from asperity.measurement.levels_and_trends import (
     neighbour_scatter,
     slope_of,
 )
-from asperity.recording.defects.resolution import recorder_step
+from asperity.measurement.sliding.change_points import (
+    FEWEST,
+    MEANS,
+    Piece,
+    RecordedDisplacement,
+    pieces_of,
+    recorded_displacement,
+)
 
-#: First sample of a piece, and the sample after its last.
-Piece = tuple[int, int]
-
-#: Number of blocks of equal time, of equal numbers of samples and of equal slip each; number of
-#: parts into which a block next to a change is divided.
-_BLOCKS, _PARTS = 300, 12
-#: Fewest means from which noise is estimated; number of parts of a recording, of which the quietest
-#: quarter gives the noise.
-_MEANS, _QUIET_PARTS = 96, 16
-#: A recorder is coarse if this share of its samples repeats the preceding sample.
-_COARSE = 0.2
-#: Multiple of the penalty of the Bayesian information criterion for a piece, as noise of a gauge is
-#: not white.
-_PENALTY = 2.0
 #: Neighbouring pieces whose velocities have a smaller ratio are one segment; with a ratio between
 #: the two numbers it is doubtful whether they are one segment or two.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
@@ -54,8 +45,6 @@ _TRANSITION, _RAMP = 0.15, 0.5
 _OVERSHOOT = 0.05
 #: Two lines are intersected over lengths at whose ends they differ by this multiple of the noise.
 _LINE = 50.0
-#: Fewest samples of a piece.
-_FEWEST = 4
 #: A segment that moves by at most this multiple of the noise is at rest.
 _STILL = 6.0
 #: A gauge jumps between two parts of a segment if the displacement changes there by more than this
@@ -117,29 +106,6 @@ class Partition:
     rates: tuple[Rate, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """A displacement over time, and its noise.
-
-    Attributes
-    ----------
-    time, displacement : array, (n,)
-    noise : float
-        Standard deviation of a sample (m).
-    slow_noise : float
-        Standard deviation (m) that a sample would have, were the noise of means over many samples
-        white.
-    step : float
-        Step of a coarse recorder (m); 0 for a fine recorder.
-    """
-
-    time: Float
-    displacement: Float
-    noise: float
-    slow_noise: float
-    step: float
-
-
 def partition(time: Float, displacement: Float | None) -> Partition:
     """Cut a recording where its velocity changes.
 
@@ -150,8 +116,8 @@ def partition(time: Float, displacement: Float | None) -> Partition:
     """
     if displacement is None:
         return Partition((), (np.nan,), (False,))
-    motion = _motion(time, displacement)
-    pieces, parts, doubts = _segments(motion, _pieces(motion))
+    motion = recorded_displacement(time, displacement)
+    pieces, parts, doubts = _segments(motion, pieces_of(motion))
     cuts = tuple(_intersection(motion, before, after) for before, after in pairwise(pieces))
     # A piece may hold samples from beyond the cut.
     between = pairwise([0, *(cut.sample for cut in cuts), time.size])
@@ -181,9 +147,9 @@ def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
         require(time[0] < at < time[-1], label, rule, f"{at:.10g} s", extent)
     samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
     for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
-        rule = f"rise, with at least {_FEWEST} samples between them and the ends"
+        rule = f"rise, with at least {FEWEST} samples between them and the ends"
         got = f"{max(b - a, 0)} before {at:.10g} s"
-        require(b - a >= _FEWEST, label, rule, got, "leave one out, or correct them")
+        require(b - a >= FEWEST, label, rule, got, "leave one out, or correct them")
 
 
 def partition_at(
@@ -205,7 +171,7 @@ def partition_at(
     rates: list[Rate] = []
     if displacement is not None:
         pieces = list(pairwise([0, *at.tolist(), time.size]))
-        motion = _motion(time, displacement)
+        motion = recorded_displacement(time, displacement)
         rates = [_mean_velocity(motion, [piece], piece) for piece in pieces]
         speeds, holds, _ = _speeds(motion, pieces, [rate.value for rate in rates])
     if velocities is None:
@@ -248,151 +214,20 @@ def _contradicted(given: Sequence[float], measured: Sequence[float]) -> list[str
     ]
 
 
-def displacement_noise(time: Float, displacement: Float) -> float:
-    """Standard deviation of a displacement's noise (m), its resolution included.
-
-    Parameters
-    ----------
-    time, displacement : array, (n,)
-    """
-    return _motion(time, displacement).noise
-
-
-def _motion(time: Float, displacement: Float) -> _Motion:
-    """The noise of a displacement, from second differences of means over 1, 2, 4, ... samples.
-
-    A constant velocity does not contribute to second differences, and a changing velocity hardly
-    does in the quietest parts of a recording. Means over many samples scatter more than with white
-    noise if the noise of a gauge is correlated, hums or wanders.
-    """
-    noise, slow, n = 0.0, 0.0, 1
-    while n == 1 or n * _MEANS <= time.size:
-        t = time[: time.size // n * n : n]
-        x = displacement[: t.size * n].reshape(t.size, n).mean(axis=1)
-        lengths = np.diff(t)
-        even = np.abs(np.diff(lengths)) < 0.05 * lengths[1:]
-        second = np.abs(np.diff(x, 2))[even]
-        if second.size:
-            parts = np.array_split(second, max(1, min(_QUIET_PARTS, second.size // 24)))
-            usual = np.sort([np.median(part) for part in parts])
-            spread = float(usual[usual.size // (2 if n == 1 else 4)]) * 1.4826 / np.sqrt(6)
-            noise, slow = max(noise, spread), max(slow, spread * np.sqrt(n))
-        n *= 2
-    # With a coarse recorder most differences are zero: its step is the noise.
-    step = recorder_step(displacement, _COARSE)
-    floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
-    return _Motion(
-        time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step
-    )
-
-
-def _pieces(motion: _Motion) -> list[Piece]:
-    """Lines and parabolas: cut at coarse blocks first, then at finer blocks next to the changes.
-
-    Blocks next to a change are divided down to single samples, because the mean of a block in which
-    the velocity changes lies off the lines on both sides. The record of a coarse recorder stands
-    still between its steps: its blocks are divided once.
-    """
-    edges = _blocks(motion)
-    largest = float(np.diff(edges).max())
-    # The largest block is divided down to samples: noise may move a change to any block.
-    finer = 1 if motion.step else int(np.ceil(np.log(largest) / np.log(_PARTS)))
-    # Away from changes four blocks are merged into one.
-    kept = np.append(edges[::4], edges[-1])
-    for _ in range(finer):
-        bounds = edges[_change_points(motion, edges)]
-        near = np.searchsorted(edges, bounds[1:-1])[:, None] + [-1, 0, 1]
-        near = np.unique(np.clip(near, 0, edges.size - 2))
-        fine = [np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp) for k in near]
-        edges = kept = np.unique(np.concatenate([kept, bounds, *fine]))
-    bounds = edges[_change_points(motion, edges)]
-    # A spike or a jump of the gauge is no motion.
-    pieces = [(a, b) for a, b in pairwise(bounds.tolist()) if b - a >= _FEWEST]
-    return pieces or [(0, motion.time.size)]
-
-
-def _blocks(motion: _Motion) -> Index:
-    """First samples of the blocks, and the number of all samples."""
-    n = motion.time.size
-    m = max(1, n // 20_000)
-    at = np.arange(n // m) * m
-    means = motion.displacement[: at.size * m].reshape(-1, m).mean(axis=1)
-    # Noise alone makes neighbouring means differ.
-    moved = np.abs(np.diff(means)) - 3 * motion.noise * np.sqrt(2 / m)
-    path = np.concatenate([[0.0], np.cumsum(np.maximum(moved, 0.0))])
-    edges = [np.array([0, n])]
-    for measure in (motion.time[at], at.astype(float), path):
-        levels = np.linspace(measure[0], measure[-1], _BLOCKS + 1)[1:-1]
-        edges.append(at[np.searchsorted(measure, levels)])
-    return np.unique(np.concatenate(edges))
-
-
-def _change_points(motion: _Motion, edges: Index) -> list[int]:
-    """Bounds of the pieces, as places in edges: the least sum of squares and penalties."""
-    size = np.diff(edges)
-    t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
-    x = np.add.reduceat(motion.displacement - motion.displacement[0], edges[:-1]) / size
-    # In a slow block the rounding error of the recorder is the same in all samples.
-    unit = float(np.hypot(motion.slow_noise, motion.step))
-    weight = 1 / ((motion.slow_noise / unit) ** 2 / size + (motion.step / unit) ** 2 / 12)
-    x /= unit
-    t /= float(np.median(np.diff(t)))
-    n = size.size
-    parameter = _PENALTY * np.log(n)
-    best, last = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=np.intp)
-    best[0] = 0.0
-    starts = np.empty(0, dtype=np.intp)
-    # For each start: sums of w, wu, wu2, wu3, wu4, wy, wyu, wyu2, wy2 over the blocks from it on.
-    sums = np.empty((9, 0))
-    for end in range(1, n + 1):
-        starts = np.append(starts, end - 1)
-        sums = np.concatenate([sums, np.zeros((9, 1))], axis=1)
-        u, y = t[end - 1] - t[starts], x[end - 1] - x[starts]
-        powers = np.stack([np.ones_like(u), u, u**2, u**3, u**4, y, y * u, y * u**2, y**2])
-        sums += weight[end - 1] * powers
-        line, parabola = _misfits(sums)
-        total = best[starts] + np.minimum(line, parabola + parameter) + 3 * parameter
-        at = int(np.argmin(total))
-        best[end], last[end] = total[at], starts[at]
-        # A start that is worse than the best by the penalty can never become the best.
-        keep = total - 3 * parameter <= best[end]
-        starts, sums = starts[keep], sums[:, keep]
-    bounds = [n]
-    while bounds[-1] > 0:
-        bounds.append(int(last[bounds[-1]]))
-    return bounds[::-1]
-
-
-def _misfits(sums: Float) -> tuple[Float, Float]:
-    """Sums of squares that a line and a parabola leave, by orthogonal polynomials."""
-    s0, s1, s2, s3, s4, y0, y1, y2, yy = sums
-    first = s2 - s1 * s1 / s0
-    some = first > 1e-9 * s2
-    first = np.where(some, first, np.inf)
-    slope = (y1 - s1 * y0 / s0) / first
-    line = yy - y0 * y0 / s0 - slope**2 * np.where(some, first, 0.0)
-    bend = (s3 - s1 * s2 / s0) / first
-    second = s4 - s2 * s2 / s0 - bend * (s3 - s1 * s2 / s0)
-    some = some & (second > 1e-9 * s4)
-    product = y2 - s2 * y0 / s0 - bend * (y1 - s1 * y0 / s0)
-    parabola = line - np.where(some, product**2 / np.where(some, second, 1.0), 0.0)
-    return np.maximum(line, 0.0), np.maximum(parabola, 0.0)
-
-
-def _velocity(motion: _Motion, piece: Piece) -> float:
+def _velocity(motion: RecordedDisplacement, piece: Piece) -> float:
     """Slope of the displacement over a piece, m/s."""
     t, x = motion.time[slice(*piece)], motion.displacement[slice(*piece)]
     return slope_of(t, x) if t.size > 1 else np.nan
 
 
-def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> Rate:
+def _mean_velocity(motion: RecordedDisplacement, parts: list[Piece], between: Piece) -> Rate:
     """Slope of the line through the parts of a segment that lie between two samples, m/s.
 
     A motor or a gear that does not run evenly leaves a residual, which is slow noise. A jump of the
     gauge between two parts does not change the slope: the line continues at another height.
     """
     inside = [(max(a, between[0]), min(b, between[1])) for a, b in parts]
-    inside = [part for part in inside if part[1] - part[0] >= _FEWEST] or parts
+    inside = [part for part in inside if part[1] - part[0] >= FEWEST] or parts
     t, x = (
         np.concatenate([values[a:b] for a, b in inside])
         for values in (motion.time, motion.displacement)
@@ -408,15 +243,15 @@ def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> Rate:
     return fit_trend(np.stack([at, *shares], axis=1), means).rate(0)
 
 
-def _duration(motion: _Motion, piece: Piece) -> float:
+def _duration(motion: RecordedDisplacement, piece: Piece) -> float:
     """Seconds from the first sample of a piece to its last."""
     return float(motion.time[piece[1] - 1] - motion.time[piece[0]])
 
 
-def _velocity_change(motion: _Motion, piece: Piece) -> tuple[float, float]:
+def _velocity_change(motion: RecordedDisplacement, piece: Piece) -> tuple[float, float]:
     """Velocity at the end of a piece less that at its beginning, and its uncertainty (m/s)."""
     n = piece[1] - piece[0]
-    m = max(1, n // _MEANS)
+    m = max(1, n // MEANS)
     stop = piece[0] + n // m * m
     t = motion.time[piece[0] : stop].reshape(-1, m).mean(axis=1)
     x = motion.displacement[piece[0] : stop].reshape(-1, m).mean(axis=1)
@@ -426,13 +261,13 @@ def _velocity_change(motion: _Motion, piece: Piece) -> tuple[float, float]:
     return 2 * bend / span, float(np.sqrt(720 / n)) * motion.slow_noise / span
 
 
-def _still(motion: _Motion, piece: Piece, speed: float) -> bool:
+def _still(motion: RecordedDisplacement, piece: Piece, speed: float) -> bool:
     """Whether noise explains the whole motion of a piece."""
     return abs(speed) * _duration(motion, piece) <= _STILL * motion.noise
 
 
 def _segments(
-    motion: _Motion, pieces: list[Piece]
+    motion: RecordedDisplacement, pieces: list[Piece]
 ) -> tuple[list[Piece], list[list[Piece]], list[str]]:
     """Pieces without transitions and small changes, the parts that each is made of, and doubts."""
     doubts: list[str] = []
@@ -483,7 +318,7 @@ def _segments(
 
 
 def _transition(
-    motion: _Motion, pieces: list[Piece], speeds: list[float]
+    motion: RecordedDisplacement, pieces: list[Piece], speeds: list[float]
 ) -> tuple[int, int, float] | None:
     """The pieces on the two sides of the shortest transition, and its share of time or slip."""
     spans = [_duration(motion, piece) for piece in pieces]
@@ -518,7 +353,9 @@ def _transition(
     return transition
 
 
-def _course(motion: _Motion, piece: Piece, speed: float, ends: tuple[float, float]) -> str:
+def _course(
+    motion: RecordedDisplacement, piece: Piece, speed: float, ends: tuple[float, float]
+) -> str:
     """How the velocity of a piece between two segments changes.
 
     "even" if it is constant and differs from the velocities of both segments, "settling" if it goes
@@ -540,7 +377,7 @@ def _log_ratio(a: float, b: float) -> float:
     return float(abs(np.log(a / b))) if a * b > 0 else np.inf
 
 
-def _intersection(motion: _Motion, before: Piece, after: Piece) -> Cut:
+def _intersection(motion: RecordedDisplacement, before: Piece, after: Piece) -> Cut:
     """Where the lines of displacement on the two sides of a cut intersect."""
     middles = [(piece[0] + piece[1]) // 2 for piece in (before, after)]
     step = abs(_velocity(motion, after) - _velocity(motion, before))
@@ -573,7 +410,7 @@ def _intersection(motion: _Motion, before: Piece, after: Piece) -> Cut:
 
 
 def _speeds(
-    motion: _Motion, pieces: list[Piece], speeds: list[float]
+    motion: RecordedDisplacement, pieces: list[Piece], speeds: list[float]
 ) -> tuple[tuple[float, ...], tuple[bool, ...], list[str]]:
     """Velocities, zero where noise explains the motion; which segments are holds; and doubts."""
     speeds = [
