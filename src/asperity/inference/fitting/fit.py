@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from operator import attrgetter
 from typing import Annotated, Any
 
@@ -135,48 +136,33 @@ def fit(
     options = runs or RunOptions()
     several = listed_data(data, options)
     recordings = [d for d in several if isinstance(d, RecordedRun)]
-    others = [d for d in several if not isinstance(d, RecordedRun)]
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
     if not (recordings or bare):
         require_some(chosen, names)
     numbers = Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
+    others = [d for d in several if not isinstance(d, RecordedRun)]
 
-    def compared(recordings: Sequence[RecordedRun]) -> Objective:
+    def objective_with(recordings: Sequence[RecordedRun]) -> Objective:
         data = [*others, *recordings]
         return objective_of(chosen, data, names, numbers, options=options, motion=motion)
 
-    objective = compared(recordings)
+    objective = objective_with(recordings)
     steps = _Steps(progress, len(objective.unknowns))
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
-
-    def minima_under(
-        objective: Objective, recordings: Sequence[RecordedRun]
-    ) -> tuple[list[Minimum], bool]:
-        # Minima of a long recording are searched with fewer, longer blocks.
-        searched = compared(coarse) if (coarse := coarser(recordings)) else objective
-        if recordings:
-            searched = under_drift(searched)
-        minima = minima_of(
-            searched, seed, steps.minimised, drawn=starts, simpler=special, further=further
-        )
-        return with_noise(objective, minima, searched) if minima and recordings else (minima, True)
-
-    cleaner = recordings
-    for left in reversed(range(_CLEANINGS + 1)):
-        minima, agreed = minima_under(objective, cleaner)
-        if not minima or not math.isfinite(minima[0].chi2):
-            return failed_fit(objective)
-        # Samples that neither the motion nor noise explains are left out of the next fit.
-        values, terms = objective.named(minima[0].u), objective.terms_of(RunTerm)
-        before = [(run.wrong or (), run.doubts) for run in cleaner]
-        cleaner = [
-            with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
-            for run, term in zip(recordings, terms, strict=True)
-        ]
-        if not left or before == [(run.wrong, run.doubts) for run in cleaner]:
-            break
-        objective = compared(cleaner)
+    search = partial(
+        minima_of,
+        seed=seed,
+        progress=steps.minimised,
+        drawn=starts,
+        simpler=special,
+        further=further,
+    )
+    objective, minima, agreed = _without_wrong_samples(
+        objective_with, objective, recordings, search
+    )
+    if not minima or not math.isfinite(minima[0].chi2):
+        return failed_fit(objective)
     holds = objective.terms_of(HoldTerm)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
         minima = with_estimated_errors(objective, minima)
@@ -205,6 +191,43 @@ def fit(
         )
         warnings += contradicted_stiffness(result, freed, recordings, given)
     return replace(result, sentences=(*warnings, *result.sentences))
+
+
+def _without_wrong_samples(
+    objective_with: Callable[[Sequence[RecordedRun]], Objective],
+    objective: Objective,
+    recordings: Sequence[RecordedRun],
+    search: Callable[[Objective], list[Minimum]],
+) -> tuple[Objective, list[Minimum], bool]:
+    """The last objective and its minima, and whether noise and parameters agree.
+
+    Samples that neither the motion nor noise explains are left out of the next fit, until a fit
+    finds no others.
+    """
+    cleaner = list(recordings)
+    for left in reversed(range(_CLEANINGS + 1)):
+        agreed = True
+        if recordings:
+            # Minima of a long recording are searched with fewer, longer blocks.
+            coarse = coarser(cleaner)
+            searched = under_drift(objective_with(coarse) if coarse else objective)
+            minima = search(searched)
+            if minima:
+                minima, agreed = with_noise(objective, minima, searched)
+        else:
+            minima = search(objective)
+        if not minima or not math.isfinite(minima[0].chi2):
+            break
+        values, terms = objective.named(minima[0].u), objective.terms_of(RunTerm)
+        before = [(run.wrong or (), run.doubts) for run in cleaner]
+        cleaner = [
+            with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
+            for run, term in zip(recordings, terms, strict=True)
+        ]
+        if not left or before == [(run.wrong, run.doubts) for run in cleaner]:
+            break
+        objective = objective_with(cleaner)
+    return objective, minima, agreed
 
 
 def with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
