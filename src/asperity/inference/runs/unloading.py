@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Bool, Float
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.runs.recorded_drive import recorded_load
 from asperity.inference.runs.run import STIFFNESS
@@ -123,6 +124,71 @@ def measured_stiffness(
     elastic asperities: the measured compliance is 1/K + lambda/W, machine and contact in series.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
+    stretch = _in_span(trace, span, load, force)
+    (low, high), (time, x, F) = span, stretch.columns.T
+    q = max(1, time.size // _MOST)
+    t, moved, F = stretch.columns[: time.size // q * q].reshape(-1, q, 3).mean(axis=1).T
+    noise, spread = displacement_noise(time, x) / math.sqrt(q), float(moved.std())
+    rule = "have a load point that moves"
+    got = f"{spread:.3g} m from {low:g} to {high:g} s with noise of {noise:.2g} m"
+    require(spread > _MOVES * noise, "span", rule, got, "give a stretch of unloading or reloading")
+    half = float(np.ptp(moved)) / 2
+    u = (moved - moved.mean()) / half
+    (_, slope), covariance = _least_squares(np.stack([np.ones_like(u), u], axis=1), F)
+    outside = stretch.pulled_outside
+    slope *= np.sign(outside if abs(outside) > 2 * half else slope)
+    se = math.sqrt(covariance[1, 1])
+    usual = max(stretch.usual_force, 1e-300)
+    if slope < _SEEN * se or 2 * slope / usual < _CHANGES:
+        raise InputError(
+            "span",
+            "have a force that rises with the load point's displacement",
+            f"a change by {2 * slope / usual:.2g} of the friction "
+            f"({2 * se / usual:.1g} standard error) from {low:g} to {high:g} s",
+            "give a stretch of unloading or reloading",
+        )
+    bend, bend_se = _bend(u, t, F, slope, low, high)
+    # Ratio of the true to the attenuated slope: noise of the displacement is not in the force.
+    attenuation = (noise / spread) ** 2
+    bending = max(abs(bend), bend_se) / (2 * math.sqrt(3))
+    K = float(slope / half / (1 - attenuation))
+    error = K * math.hypot(se / slope, attenuation, bending)
+    return MeasuredStiffness(
+        over_load=K / stretch.mean_load,
+        over_load_se=error / stretch.mean_load,
+        value=K,
+        se=error,
+        unit=KINDS[STIFFNESS[stretch.unit]].si,
+        span=(float(time[0]), float(time[-1])),
+        samples=time.size,
+        bend=bend,
+        bend_se=bend_se,
+    )
+
+
+class _Stretch(NamedTuple):
+    """A recording in a span of time.
+
+    Attributes
+    ----------
+    columns : array, shape (samples, 3)
+        Time, displacement of the load point and friction force, F/W without a recorded load.
+    mean_load, unit : float, str
+        Mean load and its unit; 1 and empty without a recorded load.
+    usual_force : float
+        Median of F/W in the recording times the mean load.
+    pulled_outside : float
+        Displacement in the recording outside of the span, whose sign is the pulling direction.
+    """
+
+    columns: Float
+    mean_load: float
+    unit: str
+    usual_force: float
+    pulled_outside: float
+
+
+def _in_span(trace: Trace, span: tuple[float, float], load: str, force: str) -> _Stretch:
     trace = replace(trace, time=even_times(trace.time))
     low, high = span
     rising(span, "span", "give its two times")
@@ -131,64 +197,19 @@ def measured_stiffness(
         rule = "have the displacement of the load point"
         raise InputError("recording", rule, f"none: {signals.no_motion}", "name a channel")
     here = (signals.time >= low) & (signals.time <= high)
-    count = int(here.sum())
-    rule, got = f"hold at least {_FEWEST} samples", f"{count} from {low:g} to {high:g} s"
-    require(not count < _FEWEST, "span", rule, got, "give a longer one")
-    inside = signals.time[here]
-    known = recorded_load(trace, load, inside, "span", "give another one")
-    weight = np.ones(count) if known is None else np.interp(inside, *known)
-    unit = "" if known is None else signals.load_unit
-    x = signals.displacement
-    columns = np.stack([inside, x[here], signals.friction[here] * weight], axis=1)
-    noise = displacement_noise(columns[:, 0], columns[:, 1])
-    q = max(1, count // _MOST)
-    t, moved, F = columns[: count // q * q].reshape(-1, q, 3).mean(axis=1).T
-    noise /= math.sqrt(q)
-    spread = float(moved.std())
-    rule = "have a load point that moves"
-    got = f"{spread:.3g} m from {low:g} to {high:g} s with noise of {noise:.2g} m"
-    require(spread > _MOVES * noise, "span", rule, got, "give a stretch of unloading or reloading")
-    half = float(np.ptp(moved)) / 2
-    u = (moved - moved.mean()) / half
-    (_, slope), covariance = _least_squares(np.stack([np.ones_like(u), u], axis=1), F)
-    direction = _direction(x, here, 2 * half) or float(np.sign(slope))
-    slope *= direction
-    se = math.sqrt(covariance[1, 1])
-    usual = float(np.median(np.abs(signals.friction))) * float(weight.mean())
-    share = 2 * slope / max(usual, 1e-300)
-    if slope < _SEEN * se or share < _CHANGES:
-        raise InputError(
-            "span",
-            "have a force that rises with the load point's displacement",
-            f"a change by {share:.2g} of the friction "
-            f"({2 * se / max(usual, 1e-300):.1g} standard error) from {low:g} to {high:g} s",
-            "give a stretch of unloading or reloading",
-        )
-    bend, bend_se = _bend(u, t, F, slope, low, high)
-    # Ratio of the true to the attenuated slope: noise of the displacement is not in the force.
-    attenuation = (noise / spread) ** 2
-    bending = max(abs(bend), bend_se) / (2 * math.sqrt(3))
-    K = slope / half / (1 - attenuation)
-    error = K * math.hypot(se / slope, attenuation, bending)
-    mean = float(weight.mean())
-    return MeasuredStiffness(
-        over_load=K / mean,
-        over_load_se=error / mean,
-        value=K,
-        se=error,
-        unit=KINDS[STIFFNESS[unit]].si,
-        span=(float(columns[0, 0]), float(columns[-1, 0])),
-        samples=count,
-        bend=bend,
-        bend_se=bend_se,
-    )
-
-
-def _direction(x: Float, here: Bool, length: float) -> float:
-    """Sign of the displacement in the pulling direction, from outside the span; 0 if unknown."""
+    time, x = signals.time[here], signals.displacement[here]
+    rule, got = f"hold at least {_FEWEST} samples", f"{time.size} from {low:g} to {high:g} s"
+    require(time.size >= _FEWEST, "span", rule, got, "give a longer one")
+    known = recorded_load(trace, load, time, "span", "give another one")
+    weight = np.ones(time.size) if known is None else np.interp(time, *known)
     outside = ~(here[1:] & here[:-1])
-    net = float(np.diff(x)[outside].sum())
-    return float(np.sign(net)) if abs(net) > length else 0.0
+    return _Stretch(
+        np.stack([time, x, signals.friction[here] * weight], axis=1),
+        float(weight.mean()),
+        "" if known is None else signals.load_unit,
+        float(np.median(np.abs(signals.friction))) * float(weight.mean()),
+        float(np.diff(signals.displacement)[outside].sum()),
+    )
 
 
 def _bend(
