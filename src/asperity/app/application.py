@@ -54,33 +54,10 @@ def build(
         Locations of laws outside the package, which worker processes import too.
     """
     modules = [importlib.import_module(f"asperity.app.api.{tab}") for tab in TABS]
-    # Threads for short computations; the page requests one computation at a time.
-    threads = ThreadPoolExecutor(min(2, os.cpu_count() or 1), "asperity-answers")
-    lanes: dict[str, Jobs] = {}
-    uploads = Uploads()
     tasks: dict[str, Callable[[], Any]] = {}
-    routes: list[Route | Mount] = []
-    limits: dict[str, int] = {}
-    warm: dict[str, str | None] = {}
     for module in modules:
         tasks |= getattr(module, "preparations", dict)()
-        for endpoint in module.ENDPOINTS:
-            path = f"/api/{endpoint.path}"
-            if isinstance(endpoint, Upload):
-                handler = _upload(endpoint, uploads)
-                limits[path] = endpoint.largest
-            elif isinstance(endpoint, Job):
-                # A process with limits runs a single job, which solves no orbits.
-                preload = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
-                jobs = lanes.setdefault(
-                    endpoint.lane, Jobs(preload=preload, laws=laws, folder=uploads.folder)
-                )
-                warm[endpoint.lane] = warm.get(endpoint.lane) or endpoint.warm
-                handler = _job(endpoint, jobs, uploads)
-                limits[path] = endpoint.largest or BODY_LIMIT
-            else:
-                handler = _answer(endpoint, threads)
-            routes.append(Route(path, handler, methods=["POST"]))
+    endpoints = _Endpoints([e for module in modules for e in module.ENDPOINTS], laws)
     preparation = Preparation(tasks)
     use(preparation)
 
@@ -90,7 +67,8 @@ def build(
     async def page(request: Request) -> Response:
         return FileResponse(STATIC / "index.html")
 
-    routes += [
+    routes: list[Route | Mount] = [
+        *endpoints.routes,
         Route("/", page),
         Route("/api/catalogue", whole_catalogue),
         Mount("/static", StaticFiles(directory=STATIC)),
@@ -102,14 +80,10 @@ def build(
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         if prepare:
             preparation.start([n for m in modules for n in getattr(m, "AT_START", ())])
-            for name, first in warm.items():
-                await lanes[name].prepare(first)
+            await endpoints.prepare()
         yield
         preparation.close()
-        threads.shutdown(wait=False, cancel_futures=True)
-        for jobs in lanes.values():
-            await jobs.close()
-        uploads.close()
+        await endpoints.close()
 
     handlers: dict[Any, Any] = {
         InputError: _bad_input,
@@ -124,7 +98,56 @@ def build(
         with naming(in_labels):
             await app(scope, receive, send)
 
-    return Guard(with_labels, port, in_notebook, limits)
+    return Guard(with_labels, port, in_notebook, endpoints.limits)
+
+
+class _Endpoints:
+    """Endpoints of all tabs, with the threads, processes and files that they share.
+
+    Attributes
+    ----------
+    routes : list of Route
+    limits : dict of str to int
+        Largest request (bytes) of each path.
+    """
+
+    def __init__(self, endpoints: Sequence[Answer | Job | Upload], laws: Sequence[str]) -> None:
+        # Threads for short computations; the page requests one computation at a time.
+        self._threads = ThreadPoolExecutor(min(2, os.cpu_count() or 1), "asperity-answers")
+        self._uploads, self._laws = Uploads(), laws
+        self._lanes: dict[str, Jobs] = {}
+        self._warm: dict[str, str | None] = {}
+        self.limits: dict[str, int] = {}
+        self.routes = [
+            Route(f"/api/{e.path}", self._handler(e, f"/api/{e.path}"), methods=["POST"])
+            for e in endpoints
+        ]
+
+    def _handler(self, endpoint: Answer | Job | Upload, path: str) -> Callable[[Request], Any]:
+        if isinstance(endpoint, Upload):
+            self.limits[path] = endpoint.largest
+            return _upload(endpoint, self._uploads)
+        if isinstance(endpoint, Answer):
+            return _answer(endpoint, self._threads)
+        self.limits[path] = endpoint.largest or BODY_LIMIT
+        # A process with limits runs a single job, which solves no orbits.
+        preload = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
+        name, folder = endpoint.lane, self._uploads.folder
+        jobs = self._lanes.setdefault(name, Jobs(preload=preload, laws=self._laws, folder=folder))
+        self._warm[name] = self._warm.get(name) or endpoint.warm
+        return _job(endpoint, jobs, self._uploads)
+
+    async def prepare(self) -> None:
+        """Start the processes, with the first job that each runs."""
+        for name, first in self._warm.items():
+            await self._lanes[name].prepare(first)
+
+    async def close(self) -> None:
+        """End threads and processes, and remove uploaded files."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for jobs in self._lanes.values():
+            await jobs.close()
+        self._uploads.close()
 
 
 def _answer(endpoint: Answer, threads: ThreadPoolExecutor) -> Callable[[Request], Any]:
