@@ -366,7 +366,6 @@ def table_of(
     InputError
         As `read_table`.
     """
-    known = _known()
     arrays = {}
     for key in (key for key in columns if key not in _OF_RESPONSES):
         try:
@@ -378,50 +377,8 @@ def table_of(
     if row_names is None:
         row_names = [f"row {i}" for i in range(1, rows + 1)]
     _fill_frequency(arrays)
-    points: dict[str, Float] = {}
-    observed: dict[str, Float] = {}
-    covariances: dict[tuple[str, str], Float] = {}
-    of_epsilon: dict[str, Float] = {}
-    for key, column in arrays.items():
-        column = in_all_rows(column, rows, f"{name}.{key}")
-        parameter = canonical_name(key, known)
-        if parameter in MODULATION:
-            # An empty cell means 0: a harmonic load.
-            rule = "be 0, since fits are to a harmonic load"
-            zero = np.nan_to_num(column) == 0
-            _require(row_names, zero, name, key, column, rule, "leave those rows out")
-        elif parameter is not None:
-            _require_one_column(name, parameter, key, parameter in points)
-            advice = "fill the cell in or leave the row out"
-            _require(
-                row_names,
-                np.isfinite(column),
-                name,
-                parameter,
-                column,
-                "be a finite number",
-                advice,
-            )
-            points[parameter] = np.asarray(known[parameter].check(column, f"{name}.{parameter}"))
-        elif key in _PAIRS:
-            pair = " and ".join(_PAIRS[key])
-            _require_one_column(name, f"the covariance of {pair}", key, _PAIRS[key] in covariances)
-            covariances[_PAIRS[key]] = column
-        elif key.endswith("_cov") and key.startswith(OBSERVABLES):
-            raise InputError(
-                f"{name}.{key} must name two observables as <name>_<name>_cov, of "
-                f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
-            )
-        elif key in _OF_EPSILON:
-            _require_one_column(name, "epsilon_err", key, "epsilon" in of_epsilon)
-            # Without a column or cell, epsilon is exact.
-            spread = np.nan_to_num(column)
-            good = np.isfinite(spread) & (spread >= 0)
-            _require(row_names, good, name, key, column, "be finite and not negative", "correct it")
-            of_epsilon["epsilon"] = spread
-        elif (plain := _observable_of(key)) is not None:
-            _require_one_column(name, plain, key, plain in observed)
-            observed[plain] = column
+    arrays = {key: in_all_rows(a, rows, f"{name}.{key}") for key, a in arrays.items()}
+    points, observed, covariances, of_epsilon = _by_role(name, arrays, row_names)
     missing = [p for p in _OPERATING if p not in points]
     if missing:
         raise InputError(
@@ -440,6 +397,51 @@ def table_of(
     _refuse_copies(table, table, "{0} must have each reading once, got {2} equal to {1}")
     _refuse_impossible(table)
     return _without_copies(table)
+
+
+def _by_role(
+    table: str, arrays: Mapping[str, Float], row_names: Sequence[str]
+) -> tuple[dict[str, Float], dict[str, Float], dict[tuple[str, str], Float], dict[str, Float]]:
+    """Operating points, observables with errors, covariances, and the error of epsilon."""
+    known = _known()
+    points: dict[str, Float] = {}
+    observed: dict[str, Float] = {}
+    covariances: dict[tuple[str, str], Float] = {}
+    of_epsilon: dict[str, Float] = {}
+    for key, column in arrays.items():
+        parameter = canonical_name(key, known)
+        if parameter in MODULATION:
+            # An empty cell means 0: a harmonic load.
+            rule = "be 0, since fits are to a harmonic load"
+            zero = np.nan_to_num(column) == 0
+            _require(row_names, zero, table, key, column, rule, "leave those rows out")
+        elif parameter is not None:
+            _require_one_column(table, parameter, key, parameter in points)
+            finite, rule = np.isfinite(column), "be a finite number"
+            advice = "fill the cell in or leave the row out"
+            _require(row_names, finite, table, parameter, column, rule, advice)
+            points[parameter] = np.asarray(known[parameter].check(column, f"{table}.{parameter}"))
+        elif key in _PAIRS:
+            pair = " and ".join(_PAIRS[key])
+            _require_one_column(table, f"the covariance of {pair}", key, _PAIRS[key] in covariances)
+            covariances[_PAIRS[key]] = column
+        elif key.endswith("_cov") and key.startswith(OBSERVABLES):
+            raise InputError(
+                f"{table}.{key} must name two observables as <name>_<name>_cov, of "
+                f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
+            )
+        elif key in _OF_EPSILON:
+            _require_one_column(table, "epsilon_err", key, "epsilon" in of_epsilon)
+            # Without a column or cell, epsilon is exact.
+            spread = np.nan_to_num(column)
+            good = np.isfinite(spread) & (spread >= 0)
+            rule = "be finite and not negative"
+            _require(row_names, good, table, key, column, rule, "correct it")
+            of_epsilon["epsilon"] = spread
+        elif (plain := _observable_of(key)) is not None:
+            _require_one_column(table, plain, key, plain in observed)
+            observed[plain] = column
+    return points, observed, covariances, of_epsilon
 
 
 def _require_one_column(table: str, quantity: str, key: str, known: bool) -> None:
