@@ -237,41 +237,15 @@ def _of_readings(
     motion: Mapping[str, bool],
 ) -> Objective:
     """The function to minimise for a table, recordings, or both."""
-    fixed, material = given.fixed, given.material
-    alone = table is None
     require_motion(free, motion)
-    require_motion(fixed, motion, label="fixed")
+    require_motion(given.fixed, motion, label="fixed")
+    alone = table is None
     # The stiffness of a recording is free, shared by all data if it is named.
     shared = "K" in free
-    priors = given.priors(free)
-    mu0_given = not alone or "mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
-    assumed = {}
-    if recordings:
-        require_no_layer(free)
-    if alone:
-        require_seen(recordings, free)
-        if not any(run.load_varies for run in recordings):
-            counted = ("M", "eta", *motion)
-            require_counted(fixed, motion, counted, "a recording of a constant load")
-        # Under a constant load the offset of a recording takes up any mu0.
-        first = next((run for run in recordings if run.load_varies), recordings[0])
-        assumed = _reference_of(first, fixed, mu0_given=mu0_given)
-    elif shared or "K" in fixed:
-        require_newtons(recordings)
     # The gain of a gauge is a nuisance of recordings: its prior makes it free.
     of_law = [n for n in free if not (recordings and n.partition("[")[0] == GAIN)]
-    constants = fixed_values(law, table, of_law, fixed, material, assumed=assumed)
-    require_masses(free, constants, motion)
-    begun = start_values(law, free, given.start, material, runs=recordings)
-    if shared and not alone:
-        loads = [*np.ravel(constants.get("W0", math.nan)), *(run.W0 for run in recordings)]
-        begun, priors = stiffness_of_table(begun, priors, loads)
-    if recordings:
-        require_calibrated(recordings, free, priors, mu0_given=mu0_given, with_table=not alone)
-    usual = usual_ranges(recordings) if recordings else {}
-    if "W0" in constants and "K" not in (*begun, *priors):
-        W0 = float(np.median(constants["W0"]))
-        usual["K"] = (USUAL_STIFFNESS[0] * W0, USUAL_STIFFNESS[1] * W0)
+    constants = _constants(law, table, recordings, free, of_law, given, motion)
+    begun, priors, usual = _starts(law, table, recordings, free, given, constants)
     unknowns = list(
         unknowns_of(
             law,
@@ -298,7 +272,7 @@ def _of_readings(
             _of_recordings(law, constants, motion),
             with_table=not alone,
             shared_stiffness=shared,
-            fixed_stiffness=fixed.get("K"),
+            fixed_stiffness=given.fixed.get("K"),
             start=begun,
             priors=priors,
             options=options,
@@ -312,6 +286,66 @@ def _of_readings(
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )
+
+
+def _mu0_is_given(table: LockInTable | None, free: Sequence[str], given: Given) -> bool:
+    """Whether mu0 has a value or is free; recordings alone need neither."""
+    known = (*free, *given.fixed, *material_values(given.material, ["mu0"]))
+    return table is not None or "mu0" in known
+
+
+def _constants(
+    law: type[Law],
+    table: LockInTable | None,
+    recordings: Sequence[RecordedRun],
+    free: list[str],
+    of_law: list[str],
+    given: Given,
+    motion: Mapping[str, bool],
+) -> dict[str, Any]:
+    """Values of the parameters that are not in `of_law`, the free ones without a gain."""
+    assumed = {}
+    if recordings:
+        require_no_layer(free)
+    if table is None:
+        require_seen(recordings, free)
+        if not any(run.load_varies for run in recordings):
+            counted = ("M", "eta", *motion)
+            require_counted(given.fixed, motion, counted, "a recording of a constant load")
+        # Under a constant load the offset of a recording takes up any mu0.
+        first = next((run for run in recordings if run.load_varies), recordings[0])
+        mu0_given = _mu0_is_given(table, free, given)
+        assumed = _reference_of(first, given.fixed, mu0_given=mu0_given)
+    elif "K" in free or "K" in given.fixed:
+        require_newtons(recordings)
+    constants = fixed_values(law, table, of_law, given.fixed, given.material, assumed=assumed)
+    require_masses(free, constants, motion)
+    return constants
+
+
+def _starts(
+    law: type[Law],
+    table: LockInTable | None,
+    recordings: Sequence[RecordedRun],
+    free: list[str],
+    given: Given,
+    constants: Mapping[str, Any],
+) -> tuple[dict[str, Any], dict[str, Prior], dict[str, tuple[float, float]]]:
+    """Start values, priors, and the usual ranges of further starts."""
+    begun = start_values(law, free, given.start, given.material, runs=recordings)
+    priors = given.priors(free)
+    if "K" in free and table is not None:
+        loads = [*np.ravel(constants.get("W0", math.nan)), *(run.W0 for run in recordings)]
+        begun, priors = stiffness_of_table(begun, priors, loads)
+    usual: dict[str, tuple[float, float]] = {}
+    if recordings:
+        mu0_given, with_table = _mu0_is_given(table, free, given), table is not None
+        require_calibrated(recordings, free, priors, mu0_given=mu0_given, with_table=with_table)
+        usual = usual_ranges(recordings)
+    if "W0" in constants and "K" not in (*begun, *priors):
+        W0 = float(np.median(constants["W0"]))
+        usual["K"] = (USUAL_STIFFNESS[0] * W0, USUAL_STIFFNESS[1] * W0)
+    return begun, priors, usual
 
 
 def _reference_of(
