@@ -112,13 +112,7 @@ def described_fit(
             "rows of the slowest modulation and compare"
         )
         return replace(result, sentences=(lost, *result.sentences))
-    outliers, lower = _outliers(objective, at)
-    while lower is not None:
-        lower = Minimum(objective.ordered(lower.u), lower.chi2)
-        minima, at = [lower, *minima], parabola_of(objective, *lower) or at
-        if outliers and at.p_value < DESCRIBED:
-            break
-        outliers, lower = _outliers(objective, at)
+    at, minima, outliers = _with_outliers(objective, at, minima)
     # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _not_parabolic(objective, at)
@@ -152,6 +146,34 @@ def described_fit(
         estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
         if described is not None:
             described(i + 1)
+    of_profiles = [objective.names[i] for i in sorted(profiled)]
+    warnings = _doubts(objective, at, at_edge, odd, bent, of_profiles)
+    return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
+
+
+def _with_outliers(
+    objective: Objective, at: Parabola, minima: Sequence[tuple[Float, float]]
+) -> tuple[Parabola, Sequence[tuple[Float, float]], tuple[int, ...]]:
+    """The lowest minimum, all minima, and outliers, whose search may find lower minima."""
+    outliers, lower = _outliers(objective, at)
+    while lower is not None:
+        lower = Minimum(objective.ordered(lower.u), lower.chi2)
+        minima, at = [lower, *minima], parabola_of(objective, *lower) or at
+        if outliers and at.p_value < DESCRIBED:
+            break
+        outliers, lower = _outliers(objective, at)
+    return at, minima, outliers
+
+
+def _doubts(
+    objective: Objective,
+    at: Parabola,
+    at_edge: Sequence[str],
+    odd: set[str],
+    bent: Sequence[str],
+    of_profiles: Sequence[str],
+) -> list[str]:
+    """Sentences on priors, and on intervals that are not those of a parabola."""
     warnings = _contradicted(objective, at)
     if at.stopped:
         warnings.append(
@@ -162,9 +184,8 @@ def described_fit(
     if at_edge:
         warnings.append(_not_profiled(at_edge, odd))
     if bent:
-        names = [objective.names[i] for i in sorted(profiled)]
-        warnings.append(_no_parabola(bent, names, at_edge))
-    return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
+        warnings.append(_no_parabola(bent, of_profiles, at_edge))
+    return warnings
 
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
