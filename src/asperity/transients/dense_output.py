@@ -96,10 +96,20 @@ class DenseOutput(NamedTuple):
         begin, length, coefficients = (np.asarray(a)[: int(chunk.taken)] for a in chunk[:3])
         return cls(begin, length, np.ascontiguousarray(np.moveaxis(coefficients, 0, -1)))
 
+    @classmethod
+    def joined(cls, parts: list[DenseOutput]) -> DenseOutput:
+        """Parts in order as one."""
+        return cls(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
+
     @property
     def end(self) -> float:
         """End of the last step (s)."""
         return float(self.begin[-1] + self.length[-1])
+
+    @property
+    def last_states(self) -> np.ndarray:
+        """States at the end of the last step, shape (size,)."""
+        return np.asarray(self.coefficients[..., -1].sum(0))
 
     def evaluate(self, t: np.ndarray) -> np.ndarray:
         """States at the times `t` within the steps, shape (size, n)."""

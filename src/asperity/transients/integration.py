@@ -250,6 +250,16 @@ class Integration:
                     return
             self._enter(self.checkpoint.segment + 1)
 
+    def last_segment(self) -> tuple[SegmentEquations, DenseOutput] | Termination:
+        """Equations and steps of the last segment of the programme, or why the motion ends."""
+        steps = []
+        for part in self.segment_parts():
+            if part.termination is not None:
+                return part.termination
+            if part.checkpoint.segment == len(self.programme.segments) - 1:
+                steps.append(part.dense_output)
+        return part.system, DenseOutput.joined(steps)
+
     def _enter(self, index: int) -> None:
         """Enter the segment `index` across its break point."""
         here = self.checkpoint

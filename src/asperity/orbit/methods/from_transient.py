@@ -24,6 +24,7 @@ from asperity.slider import Inertial
 from asperity.slider.inertial import StiffInertial
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
+from asperity.transients.events import Termination
 from asperity.transients.inputs import checked_integration, first_checkpoint
 
 #: Number of periods of a transient, and the largest number of its steps. After 6 periods a
@@ -114,13 +115,10 @@ def _last_period(point: Problem) -> DenseOutput | None:
         # The transient has other states, which allow slip to reverse.
         return None
     integration.checkpoint = first_checkpoint(integration.motion, programme, "steady")
-    parts = []
-    for part in integration.segment_parts():
-        if part.termination is not None:
-            return None
-        if part.checkpoint.segment == len(programme.segments) - 1:
-            parts.append(part.dense_output)
-    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)))
+    run = integration.last_segment()
+    if isinstance(run, Termination):
+        return None
+    whole = run[1]
     start = (_PERIODS - 1) * period
     # The last component is the displacement, which is no state of the equations.
     ends = whole.evaluate(period * np.arange(_PERIODS - 2, _PERIODS + 1))[:-1]

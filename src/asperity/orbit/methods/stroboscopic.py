@@ -151,18 +151,6 @@ def _integration(point: Problem, steps: list[tuple[Any, float]], rtol: float) ->
     return replace(integration, motion=motion)
 
 
-def _integrated(integration: Integration) -> tuple[SegmentEquations, DenseOutput] | Termination:
-    """The steps of the last segment, or why the motion ends before."""
-    steps = []
-    for part in integration.segment_parts():
-        if part.termination is not None:
-            return part.termination
-        if part.checkpoint.segment == len(integration.programme.segments) - 1:
-            steps.append(part.dense_output)
-    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*steps, strict=True)))
-    return part.system, whole
-
-
 def _settled_states(point: Problem) -> tuple[Float | None, float]:
     """States after some periods from steady sliding, or at the end of the branch of orbits.
 
@@ -173,9 +161,9 @@ def _settled_states(point: Problem) -> tuple[Float | None, float]:
     integration = _integration(point, [*rise, (point.load, _PERIODS)], _ROUGH)
     integration.checkpoint = first_checkpoint(integration.motion, integration.programme, "steady")
     steady = integration.checkpoint.states[:-1]
-    run = _integrated(integration)
+    run = integration.last_segment()
     if not isinstance(run, Termination):
-        return _last_states(run[1]), 1.0
+        return run[1].last_states[:-1], 1.0
     # A sudden modulation may throw back a slider that has an orbit.
     return _branch_end(point, steady) if run.kind == "reversal" else (None, 1.0)
 
@@ -199,24 +187,19 @@ def _branch_end(point: Problem, steady: Float) -> tuple[Float | None, float]:
     return None, 1.0
 
 
-def _last_states(steps: DenseOutput) -> Float:
-    """States at the end, without the displacement."""
-    return np.asarray(steps.coefficients[:, :-1, -1].sum(0))
-
-
 def _closed(point: Problem, Y: Float, rtol: float, harmonics: int) -> _ClosedOrbit | None:
     """The orbit near states at theta = 0; where Newton's method fails, the motion goes on."""
     marched = None
     for _ in range(_PASSES):
         integration = _integration(point, [(point.load, 1)], rtol)
         integration.checkpoint = Checkpoint(0, 0.0, np.append(Y, 0.0))
-        run = _integrated(integration)
+        run = integration.last_segment()
         if isinstance(run, Termination):
             if marched is None:
                 return None
             Y, marched = marched, None
             continue
-        marched, monodromy = _last_states(run[1]), _monodromy(*run)
+        marched, monodromy = run[1].last_states[:-1], _monodromy(*run)
         if np.abs(marched - Y).max() < _CLOSED * rtol:
             observables = _observables(Y, *run, monodromy, harmonics)
             return _ClosedOrbit(observables, run[1], run[0])
