@@ -16,7 +16,7 @@ from asperity.transients.inputs import checked_integration
 COMMON = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 START = {"load": 7.0, "velocity": 1e-6}
 MODULATED = Programme(Modulate(0.02, 0.2, "120 Hz"), **START)
-one_kernel = importlib.import_module("asperity.transients.step_size")
+one_kernel = importlib.import_module("asperity.transients.one_kernel")
 
 
 class Sorting(asp.laws.RiceRuina):

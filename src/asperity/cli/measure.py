@@ -398,11 +398,7 @@ def _campaign(
     from asperity.measurement.campaign import run_campaign
     from asperity.measurement.report import healing_section
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
-    from asperity.measurement.stick_slip.threshold import (
-        thresholds as ends_of_stick_slip,
-        write_thresholds,
-    )
-    from asperity.outputs import output_files, written_file
+    from asperity.outputs import output_files
     from asperity.outputs.sections import Section
     from asperity.parameters.parameter import count_text
 
@@ -437,14 +433,7 @@ def _campaign(
         ],
     )
     output.draw(lambda: with_cycles(campaign).plot())
-    unknown = []
-    if thresholds is not None:
-        ends = ends_of_stick_slip(done.table)
-        unknown = [end.reason for end in ends if end.reason]
-        if not ends:
-            unknown = ["no row has a regime, K, V and W0; give them by --set or --conditions"]
-        with written_file(thresholds, "--thresholds") as file:
-            write_thresholds(file, ends)
+    unknown = [] if thresholds is None else _ends_of_stick_slip(done.table, thresholds)
     say(
         *(f"cannot tell where stick-slip ends: {reason}" for reason in unknown),
         done.sliding
@@ -457,6 +446,19 @@ def _campaign(
         "says why",
     )
     return int(done.failed > 0 or bool(unknown))
+
+
+def _ends_of_stick_slip(table: list[dict[str, Any]], out: Path) -> list[str]:
+    """Write where stick-slip ends for each machine; why it is unknown for some."""
+    from asperity.measurement.stick_slip.threshold import thresholds, write_thresholds
+    from asperity.outputs import written_file
+
+    ends = thresholds(table)
+    with written_file(out, "--thresholds") as file:
+        write_thresholds(file, ends)
+    if not ends:
+        return ["no row has a regime, K, V and W0; give them by --set or --conditions"]
+    return [end.reason for end in ends if end.reason]
 
 
 def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:

@@ -19,7 +19,8 @@ from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import Interval, StepChunk
 from asperity.transients.equations import SegmentEquations, Tolerances
-from asperity.transients.step_size import TrialStep, one_kernel, run_steps
+from asperity.transients.one_kernel import one_kernel
+from asperity.transients.step_size import TrialStep, run_steps
 
 _SAFETY = 0.9
 #: Smallest and largest factor by which a step may change its length.

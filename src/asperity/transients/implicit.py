@@ -25,7 +25,8 @@ from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import solve_columns, spectral_radius, value_and_jacobian
 from asperity.transients.dense_output import Interval, StepChunk
 from asperity.transients.equations import SegmentEquations, Tolerances
-from asperity.transients.step_size import TrialStep, one_kernel, run_steps
+from asperity.transients.one_kernel import one_kernel
+from asperity.transients.step_size import TrialStep, run_steps
 
 STAGES = 5
 _SAFETY = 0.9
