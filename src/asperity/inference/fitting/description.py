@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
@@ -24,21 +23,9 @@ from asperity.inference.fitting.intervals import (
     parabola_of,
 )
 from asperity.inference.fitting.minima import FAR_OFF, RIVAL
+from asperity.inference.fitting.outliers import LOWER, with_outliers
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
-from asperity.inference.holds import HoldTerm
-from asperity.inference.objective import (
-    Minimum,
-    Objective,
-    Residuals,
-    aicc_penalty,
-)
-from asperity.inference.tables.residuals import (
-    DESCRIBED,
-    outlying_rows,
-    p_value_without,
-    weights_without,
-)
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.objective import Objective, Residuals, aicc_penalty
 from asperity.inference.unknowns import Unknown
 from asperity.units import quantity_text
 
@@ -50,8 +37,6 @@ _COMPARED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
 _TOGETHER = 0.3
 #: Coordinates with a smaller standard deviation (factors of e) are not compared with the parabola.
 _PRECISE = 0.1
-#: A profile that falls by more than this below the minimum has reached another minimum.
-_LOWER = 0.01
 #: A profile that was not requested ends after this many searches without an orbit: an end of an
 #: interval at the edge takes ten such searches (22 at most in 36 profiles), a valley along the edge
 #: takes hundreds.
@@ -62,8 +47,6 @@ _NEAR = 0.5
 _DOUBTFUL = 0.05
 #: A warning is given if data and a prior differ by more standard deviations than this.
 _CONTRADICTED = 3.0
-#: Tolerance (relative change of the coordinates) of a fit with rows left out, and its evaluations.
-_REFIT_TOLERANCE, _EVALUATIONS = 1e-6, 20
 #: An estimate closer to a bound than this share of its standard error is at the bound.
 _AT_BOUND = 1e-3
 
@@ -112,7 +95,7 @@ def described_fit(
             "rows of the slowest modulation and compare"
         )
         return replace(result, sentences=(lost, *result.sentences))
-    at, minima, outliers = _with_outliers(objective, at, minima)
+    at, minima, outliers = with_outliers(objective, at, minima)
     # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _not_parabolic(objective, at)
@@ -137,7 +120,7 @@ def described_fit(
             at_edge.append(unknown.name)
             whole = unknown.name in odd
             ends = [unknown.bounds] * len(LEVELS) if whole else _ends(objective, at, i, None)
-        if along is not None and along.lowest[1] < at.chi2 - _LOWER:
+        if along is not None and along.lowest[1] < at.chi2 - LOWER:
             # The search has missed a minimum: describe the fit again from this minimum.
             missed = objective.minimise(along.lowest[0])
             if not objective.instability(missed.u) or objective.instability(at.u):
@@ -149,20 +132,6 @@ def described_fit(
     of_profiles = [objective.names[i] for i in sorted(profiled)]
     warnings = _doubts(objective, at, at_edge, odd, bent, of_profiles)
     return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
-
-
-def _with_outliers(
-    objective: Objective, at: Parabola, minima: Sequence[tuple[Float, float]]
-) -> tuple[Parabola, Sequence[tuple[Float, float]], tuple[int, ...]]:
-    """The lowest minimum, all minima, and outliers, whose search may find lower minima."""
-    outliers, lower = _outliers(objective, at)
-    while lower is not None:
-        lower = Minimum(objective.ordered(lower.u), lower.chi2)
-        minima, at = [lower, *minima], parabola_of(objective, *lower) or at
-        if outliers and at.p_value < DESCRIBED:
-            break
-        outliers, lower = _outliers(objective, at)
-    return at, minima, outliers
 
 
 def _doubts(
@@ -535,52 +504,6 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
             "tell them apart"
         )
     return replace(fit, sentences=tuple(warnings), because=because, outliers=outliers)
-
-
-def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Minimum | None]:
-    """Outliers of a table, and a lower minimum to which the fit without them leads.
-
-    Outliers are rows without which the law describes the table. A row that is steep in the
-    parameters makes several minima, of which the search may miss the lowest: the fit without that
-    row has one minimum, from which that of all rows is reached. In a fit together with recordings,
-    which takes minutes, and in one of holds, predictions are linearised.
-    """
-    if any(isinstance(term, HoldTerm) for term in objective.terms) and objective.noise_is_known:
-        return tuple(outlying_rows(at.data[0])), None
-    tables = [i for i, term in enumerate(objective.terms) if isinstance(term, LockInTerm)]
-    if not tables:
-        return (), None
-    if len(objective.terms) > 1:
-        data = objective.data_residuals(at.u)
-        return tuple(outlying_rows(data[tables[0]])) if data else (), None
-    u = at.u
-    rows = np.concatenate([at.data[0].row, np.full(at.priors, -1)])
-
-    def whole(objective: Objective) -> Residuals | None:
-        values, slopes = objective.residuals(u)
-        if not np.isfinite(values).all():
-            return None
-        return at.data[0]._replace(values=values, jacobian=slopes, row=rows)
-
-    def refit(objective: Objective, weights: Float) -> Residuals | None:
-        nonlocal u
-        (term,) = objective.terms_of(LockInTerm)
-        weighted = replace(objective, terms=(term.weighted(weights),))
-        u, _ = weighted.minimise(u, tolerance=_REFIT_TOLERANCE, evaluations=_EVALUATIONS)
-        return whole(objective)
-
-    now, coarse = whole(objective), objective.coarser()
-    outliers = () if now is None else tuple(outlying_rows(now, partial(refit, coarse)))
-    if now is not None and outliers and coarse is not objective:
-        without = refit(objective, weights_without(now, outliers))
-        if without is None or not p_value_without(without, outliers) >= DESCRIBED:
-            outliers = ()
-    if u is at.u or not (outliers or at.p_value >= FAR_OFF):
-        return outliers, None
-    end = objective.minimise(u)
-    # A minimum that is not reached again would be tried without end.
-    lower = end.chi2 < at.chi2 - _LOWER and parabola_of(objective, *end) is not None
-    return outliers, end if lower else None
 
 
 def _why_undetermined(fit: Fit, name: str) -> str:
