@@ -10,8 +10,8 @@ from asperity.inference.fitting import minima
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.estimated_noise import with_noise
 from asperity.inference.fitting.fit import with_estimated_errors
-from asperity.inference.fitting.intervals import Profile
 from asperity.inference.fitting.minima import extends, minima_of
+from asperity.inference.fitting.profile_likelihood import Profile
 from asperity.inference.levenberg_marquardt import minimised
 from asperity.inference.objective import Minimum, Objective, Residuals
 from asperity.inference.runs.term import RunTerm

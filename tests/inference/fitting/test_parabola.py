@@ -11,11 +11,8 @@ from scipy.stats import norm
 from asperity.inference import Prior, RunOptions, fit
 from asperity.inference.fitting.assembly import Given, listed_data, objective_of
 from asperity.inference.fitting.description import described_fit
-from asperity.inference.fitting.intervals import (
-    bounded_interval,
-    nowhere_negative,
-    parabola_of,
-)
+from asperity.inference.fitting.intervals import bounded_interval
+from asperity.inference.fitting.parabola import nowhere_negative, parabola_of
 from asperity.inference.unknowns import unknowns_of
 from asperity.laws import get_law
 from references.populations import population

@@ -10,7 +10,7 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 from asperity.errors import InputError
 from asperity.inference import Prior, fit, table_of
 from asperity.inference.fitting.assembly import Given, objective_of
-from asperity.inference.fitting.intervals import parabola_of
+from asperity.inference.fitting.parabola import parabola_of
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response

@@ -39,7 +39,7 @@ from asperity.inference.design.weights import (
     times_fewer,
     whole_readings,
 )
-from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
+from asperity.inference.fitting.parabola import UNDETERMINED, inverse_information
 from asperity.inference.fitting.result import Warned
 from asperity.inference.objective import Objective
 from asperity.inference.tables.table import LockInTable

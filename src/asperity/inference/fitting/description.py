@@ -11,19 +11,16 @@ from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.arrays import Float
 from asperity.errors import Argument, enumerated, named
-from asperity.inference.fitting.intervals import (
-    LEVELS,
+from asperity.inference.fitting.intervals import LEVELS, Interval, bounded_interval
+from asperity.inference.fitting.minima import FAR_OFF, RIVAL
+from asperity.inference.fitting.outliers import LOWER, with_outliers
+from asperity.inference.fitting.parabola import (
     UNDETERMINED,
-    Interval,
     Parabola,
-    Profile,
-    ProfileAtEdgeError,
-    bounded_interval,
     inverse_information,
     parabola_of,
 )
-from asperity.inference.fitting.minima import FAR_OFF, RIVAL
-from asperity.inference.fitting.outliers import LOWER, with_outliers
+from asperity.inference.fitting.profile_likelihood import Profile, ProfileAtEdgeError
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, aicc_penalty
 from asperity.inference.unknowns import Unknown

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.inference.fitting.intervals import Parabola, parabola_of
 from asperity.inference.fitting.minima import FAR_OFF
+from asperity.inference.fitting.parabola import Parabola, parabola_of
 from asperity.inference.holds import HoldTerm
 from asperity.inference.objective import Minimum, Objective, Residuals
 from asperity.inference.tables.residuals import (
