@@ -17,7 +17,7 @@ from asperity.lock_in.reference import SpectralLine, around, require_modulated, 
 from asperity.measurement.levels_and_trends import MeanLevel, effective_dof, rate_between
 from asperity.measurement.samples import Samples, about_window, require_stated_load, usable
 from asperity.measurement.static_friction import Pause, pauses_around, static_friction
-from asperity.measurement.verdicts import checks, instrument, steadiness
+from asperity.measurement.verdicts import checks, clipping, instrument, steadiness
 from asperity.measurement.verdicts.verdict import Check, Judged
 from asperity.measurement.window import LoadInterval, clean_run, settled, stretches, whole_periods
 from asperity.parameters.arguments import typed
@@ -228,7 +228,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.resolution(reading, steps),
         *instrument.computed_force(reading, samples, time, load, force),
         instrument.held_samples(reading, load, force),
-        instrument.flat_top(reading, time, load, force),
+        clipping.flat_top(reading, time, load, force),
         instrument.mains(reading, samples, parts),
         *instrument.lines_in_the_pauses(reading, samples, parts),
         instrument.hum(reading, time, force),
