@@ -274,3 +274,20 @@ def test_the_equations_are_those_of_the_asperities_on_the_branch(rapid):
     assert motion.mechanical == ("force", "velocity", "friction")
     with pytest.raises(InputError, match="span must be positive for lambda, got 0 m"):
         asp.continuation(slider, parameter="lambda", span=(0, 1e-6), **point)
+
+
+def test_a_branch_says_from_where_on_slip_would_reverse():
+    """The slider swings on its asperities, and the law slips forwards only."""
+    numbers = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
+    law = asp.laws.ElastoPlastic(**numbers, lambda_=7e-7)
+    slider = asp.Slider(law, spring=2e5, mass=1.6, load=7.0)
+    at = {"velocity": 1e-6, "frequency": 200.0, "inertia": True}
+    branch = asp.continuation(slider, parameter="epsilon", span=(0.1, 0.2), **at)
+    first = branch.parameter[branch.reverses][0]
+    assert f"from {first:.6g} on slip would reverse" in branch.result
+    last = branch.parameter[~branch.reverses][-1]
+    # The slip is read at the nodes of a mesh, and another mesh has other nodes.
+    both = asp.periodic_response(slider, epsilon=[0.998 * last, 1.002 * first], **at)
+    assert both.converged.all()
+    assert both.reverses.tolist() == [False, True]
+    assert "slip would reverse" in both.result[1]

@@ -80,6 +80,17 @@ def test_an_unstable_response_is_said_to_be_left(asperity) -> None:
     assert not asperity(*point, "K=0.23 N/um").stderr
 
 
+def test_slip_that_would_reverse_is_said(asperity) -> None:
+    """The exciter is tilted: the shear force on the slider exceeds that of the spring."""
+    half = ("-e", "0.5", "--material", "bureau2000", "--set")
+    point = ("response", *POINT[:4], *POINT[6:], *half)
+    tilted = asperity(*point, "tilt=50 deg", "--json")
+    assert tilted.exit_code == 0
+    assert "slip would reverse" in tilted.stderr
+    assert "slip would reverse" in json.loads(tilted.stdout)["result"]
+    assert not asperity(*point, "tilt=5 deg").stderr
+
+
 def test_without_a_material_all_numbers_come_from_set(asperity) -> None:
     given = ("--law", "amontons", "--set", "mu0=0.4", "--set", "K=1 N/um", "--set", "W0=2 N")
     shown = asperity("response", *given, *POINT[2:], "--json")

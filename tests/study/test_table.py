@@ -113,6 +113,15 @@ def test_the_output_has_the_columns_of_the_issue_in_order(here, tmp_path: Path) 
     ]
 
 
+def test_a_row_says_that_slip_would_reverse(here) -> None:
+    """A law that slips forwards only, on a tilted exciter; no failure."""
+    rows = [POINT | {"law": "rice-ruina", "epsilon": 0.5, "tilt": tilt} for tilt in (0.1, 0.8)]
+    (forwards, both_ways), summary = here(rows, [*COLUMNS, "tilt"])
+    assert summary.failed == 0
+    assert forwards["result"] == "converged"
+    assert both_ways["result"].startswith("converged, but slip would reverse")
+
+
 BAD = [
     ({"A": -0.01}, "A must be positive, got -0.01"),
     ({"epsilon": 1}, "epsilon must be at least 0 and below 1"),

@@ -112,6 +112,7 @@ def test_a_step_to_no_load_loses_contact_at_once(physical) -> None:
 
 
 def test_reversal_is_named_where_the_law_has_none(physical) -> None:
+    """It is where a law that is odd in the force would slip backwards at 1e-12 of the drive."""
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
     motion = transient(p.slider, programme)
@@ -120,7 +121,10 @@ def test_reversal_is_named_where_the_law_has_none(physical) -> None:
     # Stuck by then, the spring and the asperities are two springs in series.
     series = 1 / (1 / p.K + LAMBDA / 7.0)
     assert motion.termination.time > 1 + 3.5 / series / 1e-5 - 0.1
-    assert abs(motion.force[-1]) < 1e-6
+    law = p.slider.law
+    strength = law.mu0 + law.B * motion.states[-1, -1]
+    backwards = law.V0 / 1e-6 * np.exp((-motion.force[-1] / 7.0 - strength) / law.A)
+    assert backwards == pytest.approx(1e-12, rel=1e-4)
     assert finite(motion)
 
 

@@ -291,6 +291,8 @@ class BoundaryCurve:
         ln|m| + i arg m of the critical orbits.
     bounds_stability : bool array, shape (points,)
         Whether all other multipliers are inside the unit circle: one side is stable.
+    reverses : bool array, shape (points,)
+        Whether slip would reverse on the critical orbits, see `PeriodicResponse.reverses`.
     result : tuple of str
         Why the curve ends, at its first and at its last point.
     """
@@ -301,6 +303,7 @@ class BoundaryCurve:
     frequency: Float
     log_multipliers: Complex
     bounds_stability: Bool
+    reverses: Bool
     result: tuple[str, str]
 
 
@@ -352,6 +355,7 @@ class StabilityBoundary(Displayed):
             "y": (self.units[1], self.names[1]),
             "frequency": ("Hz", "critical mode"),
             "bounds_stability": ("", "one side is stable"),
+            "reverses": ("", "slip would reverse, of a law that slips forwards only"),
         }
         data = {n: joined([getattr(c, n) for c in curves], *a) for n, a in about.items()}
         numbers = [np.full(len(c.x), i) for i, c in enumerate(curves)]
@@ -513,4 +517,5 @@ def _boundary_curve(plane: ParameterPlane, curve: TracedBoundary) -> BoundaryCur
     ]
     others = order[:, 2 if curve.kind == "Neimark-Sacker" else 1 :]
     stable = (np.take_along_axis(growth, others, axis=1) < 0).all(1)
-    return BoundaryCurve(curve.kind, x, y, np.array(mode), logs, stable, curve.result)
+    reverses = np.array([p.branch_orbit.reversal_margin < 0 for p in curve.points])
+    return BoundaryCurve(curve.kind, x, y, np.array(mode), logs, stable, reverses, curve.result)

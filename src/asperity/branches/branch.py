@@ -116,6 +116,8 @@ class Branch(Displayed):
         c_1, c_2, ...
     log_multipliers : complex array, shape (points, states)
         ln|m| + i arg m by falling modulus.
+    reverses : bool array, shape (points,)
+        Whether slip would reverse on the orbit, see `PeriodicResponse.reverses`.
     periods : int
         Periods of the modulation in a period of the orbit.
     bifurcations : tuple of Bifurcation
@@ -140,6 +142,7 @@ class Branch(Displayed):
     mean_friction: Float
     harmonics: Complex
     log_multipliers: Complex
+    reverses: Bool
     periods: int
     bifurcations: tuple[Bifurcation, ...]
     result: str
@@ -211,6 +214,7 @@ class Branch(Displayed):
             "mu1": ("", "amplitude of F/W0 at the frequency of the modulation, peak"),
             "mu2": ("", "amplitude of F/W0 at twice the frequency of the modulation, peak"),
             "stable": ("", "whether all multipliers are inside the unit circle"),
+            "reverses": ("", "whether slip would reverse, of a law that slips forwards only"),
         }
         data = {n: variable(("point",), getattr(self, n), *about) for n, about in points.items()}
         bifurcations = {

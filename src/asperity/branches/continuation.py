@@ -149,6 +149,13 @@ def followed_branch(
     if followed.missed:
         near = listed(f"{value:.6g}{unit}" for value in moving.value(np.array(followed.missed)))
         result += f"; a bifurcation was not located after {near}"
+    reverses = np.array([s.reversal_margin < 0 for s in orbits])
+    if reverses.any():
+        first = values[reverses][0]
+        result += (
+            f"; from {first:.6g}{unit} on slip would reverse for part of the period, and this law "
+            "slips forwards only"
+        )
     return Branch(
         name=moving.name,
         unit=moving.unit,
@@ -156,6 +163,7 @@ def followed_branch(
         mean_friction=np.array([s.mean_friction for s in orbits]),
         harmonics=np.stack([s.harmonics for s in orbits]),
         log_multipliers=np.stack([s.logs for s in orbits]),
+        reverses=reverses,
         periods=periods,
         bifurcations=tuple(
             _bifurcation(follower, moving, located, at) for located, at in followed.bifurcations

@@ -44,6 +44,8 @@ class BranchOrbit(NamedTuple):
         Logarithms of the multipliers, by falling modulus.
     omega : float
         Angular frequency of the modulation (rad/s).
+    reversal_margin : float
+        As in `asperity.orbit.observables.Observables`.
     point : ContinuationPoint
         From where the next step starts.
     """
@@ -52,6 +54,7 @@ class BranchOrbit(NamedTuple):
     harmonics: Complex
     logs: Complex
     omega: float
+    reversal_margin: float
     point: ContinuationPoint
 
     @property
@@ -109,6 +112,7 @@ class BranchFollower(NamedTuple):
             read.harmonics[:, 0],
             logs[:, 0],
             float(problem.system.omega[0]),
+            float(read.reversal_margin[0]),
             following,
         )
         return orbit, step

@@ -127,6 +127,8 @@ def _point(point: Point, output: Output) -> int:
             "the response is unstable: the slider leaves it for another motion, whose mean and "
             "harmonics differ; asperity run integrates the motion"
         )
+    if result.reverses:
+        say(result.result[()])
     return 0
 
 

@@ -257,6 +257,10 @@ class DataTerm(ABC):
         """Sentences on data that are no measurement if the free parameters are `values`, in SI."""
         return ()
 
+    def reversal(self, values: Mapping[str, float]) -> Sequence[str]:
+        """Sentences on data for which slip would reverse, as for `instability`."""
+        return ()
+
 
 @dataclass
 class Objective:

@@ -43,6 +43,9 @@ class Observables(NamedTuple):
         computed.
     start : array, shape (size, points)
         States at theta = 0.
+    reversal_margin : array, shape (points,)
+        Smallest value of `Motion.reversal_margin`; inf where the method itself accepts no orbit
+        with a negative one.
     """
 
     mean_friction: Array
@@ -53,6 +56,7 @@ class Observables(NamedTuple):
     exponent: Array
     growth: Array
     start: Array
+    reversal_margin: Array
 
     @property
     def numbers(self) -> Complex:

@@ -17,7 +17,8 @@ class Outcome(IntEnum):
     FOLDED, RUNAWAY, RESTS, REVERSES and SENSITIVE are results, not failures of a method: the branch
     of orbits that begins with steady sliding does not reach the requested amplitude, or reaches it
     only through orbits that no computation and no experiment could stay on. Orbits that are not
-    connected to steady sliding may exist. OUT_OF_RANGE is given without a search.
+    connected to steady sliding may exist. OUT_OF_RANGE is given without a search. CONVERGED
+    with a negative `detail`, the reversal margin, means that slip would reverse on the orbit.
     """
 
     CONVERGED = 0
@@ -97,6 +98,11 @@ _SENTENCES = {
     Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }
 
+_REVERSED = (
+    "converged, but slip would reverse for part of the period, under a negative interface force, "
+    "and this law slips forwards only: the numbers are those of its equations as they stand"
+)
+
 _GROUP = (
     "the rate of steady sliding per radian, about the larger of V/(omega D0) and V K/(omega W0 A),"
 )
@@ -134,6 +140,8 @@ def sentence(outcome: int, detail: float) -> str:
         return _LOST
     if outcome == Outcome.NO_ORBIT and detail == 0:
         return _NOT_FOUND
+    if outcome == Outcome.CONVERGED and detail < 0:
+        return _REVERSED
     if outcome == Outcome.OUT_OF_RANGE:
         return _out_of_range(detail).format(detail=detail)
     return _SENTENCES[Outcome(outcome)].format(detail=detail)
@@ -151,6 +159,6 @@ def _out_of_range(detail: float) -> str:
 def sentences(outcomes: NDArray[np.int_], details: Float) -> NDArray[np.object_]:
     """`sentence` for arrays."""
     texts = np.full(outcomes.shape, _SENTENCES[Outcome.CONVERGED], dtype=object)
-    for i in map(tuple, np.argwhere(outcomes)):
+    for i in map(tuple, np.argwhere((outcomes != Outcome.CONVERGED) | (details < 0))):
         texts[i] = sentence(outcomes[i], details[i])
     return texts

@@ -194,6 +194,14 @@ class PeriodicResponse(Drawn):
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
     @property
+    def reverses(self) -> Bool:
+        """Whether slip would reverse for part of the period, of a law that slips forwards only.
+
+        Such an orbit obeys the equations as they stand, but no interface.
+        """
+        return self.converged & np.asarray(self.detail < 0)
+
+    @property
     def stable(self) -> Bool:
         """Whether a small perturbation dies out from period to period; it may grow within one."""
         with np.errstate(invalid="ignore"):
@@ -224,7 +232,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """For each point "converged", or the reason of the failure."""
+        """For each point "converged", with the reservation of `reverses`, or why it failed."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
 
     @property

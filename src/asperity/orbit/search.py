@@ -51,6 +51,12 @@ def mark_out_of_range(problem: Problem, solution: Solution) -> None:
         solution.outcome[outside], solution.detail[outside] = Outcome.OUT_OF_RANGE, values[outside]
 
 
+def mark_reversed(solution: Solution) -> None:
+    """Give orbits on which slip would reverse a negative `detail`."""
+    rows = np.flatnonzero(solution.converged & (solution.reversal_margin < 0))
+    solution.detail[rows] = solution.reversal_margin[rows]
+
+
 #: Points in a call that integrates the growth of disturbances.
 _GROWTH_CHUNK = 8
 
@@ -123,6 +129,7 @@ def find_orbits(
         for start in range(0, len(left), method.block):
             rows = left[start : start + method.block]
             solution.merge(rows, method.solve(take(problem, rows), options), method.name)
+    mark_reversed(solution)
     mark_too_unstable(problem, solution)
     options.progress(int((~solution.converged).sum()))
     return solution

@@ -23,7 +23,7 @@ class Solution(NamedTuple):
 
     Attributes
     ----------
-    mean_friction, harmonics, log_multipliers, start, waveform : array
+    mean_friction, harmonics, log_multipliers, start, waveform, reversal_margin : array
         As in `Observables`; NaN where there is no orbit.
     iterations : int array, shape (points,)
         Steps of Fourier collocation, or steps or intervals of the last division of the period.
@@ -43,6 +43,7 @@ class Solution(NamedTuple):
     log_multipliers: Complex
     start: Float
     waveform: Float
+    reversal_margin: Float
     iterations: NDArray[np.int64]
     outcome: NDArray[np.int64]
     detail: Float
@@ -70,6 +71,7 @@ class Solution(NamedTuple):
             np.full((size, points), np.nan + 0j),
             np.full((size, points), np.nan),
             np.full((2, options.phases, points), np.nan),
+            np.full(points, np.nan),
             np.zeros(points, dtype=np.int64),
             np.full(points, int(Outcome.NO_ORBIT)),
             np.zeros(points),
@@ -101,11 +103,12 @@ class Solution(NamedTuple):
         self.harmonics[:, rows] = observables.harmonics
         self.log_multipliers[:, rows] = observables.log_multipliers if logs is None else logs
         self.start[:, rows] = observables.start
+        self.reversal_margin[rows] = observables.reversal_margin
         self.outcome[rows] = Outcome.CONVERGED
 
     def discard(self, rows: Index) -> None:
         """Set the numbers of failed points to NaN, which cannot be mistaken for answers."""
-        for values in self[:5]:
+        for values in self[:6]:
             values[..., rows] = np.nan
 
     def merge(self, rows: Index, attempt: Solution, method: str = "") -> None:

@@ -71,14 +71,15 @@ class Damped(Motion):
     def log_slip(self, Y: Array, at: Excitation) -> Array:
         """ln(v_pl / V), where F_i/W is a state."""
         law = self.slider.law
-        return law.log_velocity(self._friction(Y), self.law_state(Y), at.w) - jnp.log(self.V)
-
-    def _friction(self, Y: Array) -> Array:
-        return Y[self.mechanical.index("friction")]
+        return law.log_velocity(self.friction(Y, at), self.law_state(Y), at.w) - jnp.log(self.V)
 
 
 class _OnAsperities(Damped):
     """Elastic asperities: the state "friction" is F_i/W."""
+
+    def friction(self, Y: Array, at: Excitation) -> Array:
+        """F_i/W."""
+        return Y[self.mechanical.index("friction")]
 
     @property
     def strain(self) -> Array:
@@ -88,7 +89,7 @@ class _OnAsperities(Damped):
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""
         v = self.slider_velocity(Y, at)
-        slip = self.slip_velocity(self._friction(Y), Y, at)
+        slip = self.slip_velocity(self.friction(Y, at), Y, at)
         rates = [self.kappa * (at.pull - v), self.strain * (v - slip)]
         rates[1:1] = self._acceleration(Y, at)
         return jnp.stack(jnp.broadcast_arrays(*rates, *self._law_rates(v, slip, Y, at)))
@@ -134,6 +135,11 @@ class StiffInertial(Damped):
     name: ClassVar[str] = "inertial"
     mechanical: ClassVar[tuple[str, ...]] = ("force", "log_velocity")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, True)
+
+    def reversal_margin(self, Y: Array, at: Excitation) -> Array:
+        """As in `Motion`: F_i/W, because a slider on rigid asperities stops where it vanishes."""
+        friction = self.friction(Y, at)
+        return jnp.full_like(friction, jnp.inf) if self.signed else friction
 
     def log_slip(self, Y: Array, at: Excitation) -> Array:
         """ln(v / V), a state."""

@@ -18,6 +18,9 @@ from asperity.loads import Excitation
 from asperity.slider.slider import Slider
 from asperity.slider.steady_state import steady_state
 
+#: Slip rate over V, in either direction, that has no influence on any result.
+_NEGLIGIBLE_SLIP = 1e-12
+
 
 class Motion(eqx.Module):
     """Rates of the states Y per radian of the modulation, for one law, slider and drive.
@@ -116,6 +119,24 @@ class Motion(eqx.Module):
         smaller than the mean.
         """
         return centre[0], y[0]
+
+    def friction(self, Y: Array, at: Excitation) -> Array:
+        """F_i/W."""
+        v = self.V * self.slider_velocity(Y, at)
+        return self.slider.law.friction(v, self.law_state(Y), at.w)
+
+    def reversal_margin(self, Y: Array, at: Excitation) -> Array:
+        """Negative where a law without backward slip should have some; inf if the law has.
+
+        That is where a law that is odd in F_i, as 'regularised' is, would slip backwards. A small
+        negative force, such as that of a slider that swings on its asperities, causes no slip in
+        either direction: ln v_pl is below that of steady sliding by (mu - |F_i|/W)/A.
+        """
+        friction, law = self.friction(Y, at), self.slider.law
+        if self.signed:
+            return jnp.full_like(friction, jnp.inf)
+        backwards = law.log_velocity(jnp.abs(friction), self.law_state(Y), at.w) - jnp.log(self.V)
+        return jnp.maximum(friction, np.log(_NEGLIGIBLE_SLIP) - backwards)
 
     @abstractmethod
     def log_slip(self, Y: Array, at: Excitation) -> Array:

@@ -42,6 +42,8 @@ class PointValues(NamedTuple):
         Derivatives of `log_slip` to the states.
     force_mean, force_rest : array, shape (...)
         F/W0 as a constant and a remainder, as from `Motion.force_split`.
+    reversal_margin : array, shape (...)
+        As from `Motion.reversal_margin`.
     """
 
     rates: Array
@@ -50,6 +52,7 @@ class PointValues(NamedTuple):
     slip_gradient: Array
     force_mean: Array
     force_rest: Array
+    reversal_margin: Array
 
     @property
     def force(self) -> Array:
@@ -74,10 +77,11 @@ def _values(structure: Any) -> Callable[..., PointValues]:
         def rates_and_slip(Y: Array) -> Array:
             return jnp.concatenate([system.rates(Y, at), system.log_slip(Y, at)[None]])
 
-        values, slopes = value_and_jacobian(rates_and_slip, centre + deviations)
-        constant, rest = system.force_split(centre, deviations, at)
-        constant, rest = (a * jnp.ones_like(values[0]) for a in (constant, rest))
-        return PointValues(values[:-1], slopes[:-1], values[-1], slopes[-1], constant, rest)
+        Y = centre + deviations
+        values, slopes = value_and_jacobian(rates_and_slip, Y)
+        parts = *system.force_split(centre, deviations, at), system.reversal_margin(Y, at)
+        others = (a * jnp.ones_like(values[0]) for a in parts)
+        return PointValues(values[:-1], slopes[:-1], values[-1], slopes[-1], *others)
 
     return jit_large(values)
 

@@ -34,9 +34,13 @@ class ReversingInertial(Damped):
     mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
 
+    def friction(self, Y: Array, at: Excitation) -> Array:
+        """F_i/W."""
+        return Y[1]
+
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
-        return self.slip_velocity(Y[1], Y, at)
+        return self.slip_velocity(self.friction(Y, at), Y, at)
 
     def friction_jump(self, Y: Array, before: Excitation, after: Excitation) -> Array:
         """Change of F_i/W where the load steps: the velocity is continuous."""

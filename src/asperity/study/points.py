@@ -170,7 +170,6 @@ class SweepOutcome(IntEnum):
 
 _SENTENCES = {
     SweepOutcome.NOT_COMPUTED: "not computed yet",
-    SweepOutcome.CONVERGED: "converged",
     SweepOutcome.SOLVER_ERROR: (
         "the solver stopped with an unexpected error; the log of the run has its message"
     ),
@@ -256,7 +255,7 @@ def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
         numbers = values.dtype.kind in kinds
         require(numbers, name, "be the variable of a store", shown(values), f"take store.{name}")
     texts = np.full(outcome.shape, "converged", dtype=object)
-    for i in map(tuple, np.argwhere(outcome != SweepOutcome.CONVERGED)):
+    for i in map(tuple, np.argwhere((outcome != SweepOutcome.CONVERGED) | (detail < 0))):
         texts[i] = _reason(int(outcome[i]), float(detail[i]))
     return texts
 

@@ -50,7 +50,7 @@ def answers_of_law(
         converged = response.converged
         # A point that failed may have a phase of 0 with an amplitude of NaN.
         numbers = {n: np.where(converged, _output(response, n), np.nan) for n in outputs}
-        detail = np.where(converged, 0.0, response.detail)
+        detail = np.where(converged & ~response.reverses, 0.0, response.detail)
         answers.put(index, Answers(numbers, response.outcome.astype(np.int16), detail))
     return answers
 

@@ -72,16 +72,6 @@ class SegmentEquations(eqx.Module):
         """Excitation at the time `t` (s) of the segment."""
         return self.segment.at(t, self.motion.slider.W0, self.motion.V)
 
-    def friction(self, at: Excitation, states: Array) -> Array:
-        """F_i/W of the motion's states."""
-        motion = self.motion
-        if isinstance(motion, QuasiStatic):
-            return motion.friction(states, at)
-        if "friction" in motion.mechanical:
-            return states[motion.mechanical.index("friction")]
-        v = motion.V * motion.slider_velocity(states, at)
-        return motion.slider.law.friction(v, motion.law_state(states), at.w)
-
     def motion_rates(self, at: Excitation, Y: Array) -> tuple[Array, Array]:
         """Rates of the motion's states, and of x K / W0; no rate depends on x."""
         motion = self.motion
@@ -133,6 +123,9 @@ class MotionSamples(NamedTuple):
         Velocity of the slider and plastic velocity, over V.
     friction : array
         F_i/W.
+    reversal_margin : array
+        As from `Motion.reversal_margin`; of a law with backward slip F_i/W, which changes its sign
+        with the slip.
     unsteadiness : array
         Distance from steady sliding: the larger of the relative deviation of the velocity and the
         largest change of a state while the drive moves by W0/K. NaN while the drive stands still.
@@ -143,13 +136,14 @@ class MotionSamples(NamedTuple):
     velocity: np.ndarray
     slip: np.ndarray
     friction: np.ndarray
+    reversal_margin: np.ndarray
     unsteadiness: np.ndarray
 
 
 def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     motion, at, states = system.motion, system.at(t), Y[:-1]
     velocity = motion.slider_velocity(states, at)
-    friction = system.friction(at, states)
+    friction = motion.friction(states, at)
     slip = velocity
     if motion.has_elastic_asperities:
         slip = motion.slip_velocity(friction, states, at)
@@ -158,7 +152,8 @@ def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     unsteadiness = jnp.maximum(change, jnp.abs(velocity / pull - 1))
     force = motion.force(states, at)
     # One array: every output of a compiled program costs time.
-    columns = MotionSamples(force, at.w, velocity, slip, friction, unsteadiness)
+    margin = friction if motion.signed else motion.reversal_margin(states, at)
+    columns = MotionSamples(force, at.w, velocity, slip, friction, margin, unsteadiness)
     return jnp.stack([jnp.broadcast_to(a, t.shape) for a in columns])
 
 

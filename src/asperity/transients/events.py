@@ -25,7 +25,7 @@ _SENTENCES = {
         "radiation damping, or stiffen the spring"
     ),
     "reversal": (
-        "the interface force vanished at t = {time:.9g} s and slip would reverse, for which this "
+        "slip would reverse at t = {time:.9g} s, under a negative interface force, for which this "
         "law is not defined; take one that is, such as 'regularised'"
     ),
     "rest": (
@@ -152,7 +152,7 @@ class EventDetector:
             "slip": lambda r: log_speed(r.slip, thresholds.slip),
             "runaway": lambda r: log_speed(r.slip, thresholds.runaway),
             "unsteadiness": lambda r: np.log(r.unsteadiness / thresholds.steady),
-            "friction": lambda r: r.friction,
+            "backward slip": lambda r: r.reversal_margin,
             "above level": lambda r: r.force - level,
             # The drive moves at V where a level is given.
             "ahead of the drive": lambda r: r.velocity - 1,
@@ -203,7 +203,7 @@ class EventDetector:
             terminations += [
                 Termination("runaway", t) for t, up in crossed if up and t > self._start
             ]
-        reversals = crossings("friction")
+        reversals = crossings("backward slip")
         if self._reverses:
             result += [Event(t, "reversal") for t, _ in reversals]
         else:

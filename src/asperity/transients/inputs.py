@@ -64,7 +64,7 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
 def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) -> None:
     """Refuse states from which the equations of motion give no motion."""
     first = SegmentEquations(motion, programme.segments[0])
-    rates, friction = (np.asarray(a) for a in _rates_and_friction(first, np.append(states, 0.0)))
+    rates, friction, margin = map(np.asarray, _beginning(first, np.append(states, 0.0)))
     names = (*motion.mechanical, *motion.slider.law.state_names, "displacement")
     listed = f"[{', '.join(f'{s:.4g}' for s in states)}]"
     lost = [name for name, rate in zip(names, rates, strict=True) if not np.isfinite(rate)]
@@ -74,17 +74,17 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
         advice = f"begin nearer to steady sliding, at {steady}"
         raise InputError("initial", "be states whose rates are numbers", got, advice)
     # With ln v as a state the slider always moves forwards, even at the smallest velocity.
-    defined = friction >= 0 or motion.signed or "log_velocity" in motion.mechanical
+    defined = margin >= 0 or "log_velocity" in motion.mechanical
     law, advice = motion.slider.law.name, "take a law that is, such as 'regularised'"
     got = f"{listed} and F_i/W = {friction:.4g}, for which '{law}' is not defined"
     require(defined, "initial", "leave an interface force that is not negative", got, advice)
 
 
 @jit_large
-def _rates_and_friction(first: SegmentEquations, Y: Array) -> tuple[Array, Array]:
-    """Rates (1/s) and F_i/W at the beginning of a segment."""
-    at = first.at(jnp.zeros(()))
-    return first.rates(at, Y), first.friction(at, Y[:-1])
+def _beginning(first: SegmentEquations, Y: Array) -> tuple[Array, Array, Array]:
+    """Rates (1/s), F_i/W and reversal margin at the beginning of a segment."""
+    at, motion, states = first.at(jnp.zeros(())), first.motion, Y[:-1]
+    return first.rates(at, Y), motion.friction(states, at), motion.reversal_margin(states, at)
 
 
 def require_contact(programme: Programme, W0: float) -> None:

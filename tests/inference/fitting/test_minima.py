@@ -59,6 +59,9 @@ class Formula(LockInTerm):
     def instability(self, values):
         return []
 
+    def reversal(self, values):
+        return []
+
     def weighted(self, weights):
         return Weighted(self, weights)
 

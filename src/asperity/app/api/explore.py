@@ -145,7 +145,7 @@ def point_record(response: PeriodicResponse, *, searched: bool) -> dict[str, Any
     period = over_a_period(response)
     return {
         **record,
-        "result": stability_sentence(response),
+        "result": stability_sentence(response) + _reservation(response),
         "stable": bool(response.stable),
         "phase": period.phase,
         "force": period.force,
@@ -162,6 +162,11 @@ _SHOWN = (
     *("mean_friction", "delta_mu", "mu_ss", "mu1", "mu2", "phase1", "phase2"),
     *("floquet_max", "mode_frequency", "growth_rate"),
 )
+
+
+def _reservation(response: PeriodicResponse) -> str:
+    """What limits a converged response, as the end of a sentence; empty if nothing does."""
+    return "; " + str(response.result[()]).partition(", ")[2] if response.reverses else ""
 
 
 def stability_sentence(response: PeriodicResponse) -> str:

@@ -483,6 +483,8 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
         warnings += term.warnings(residuals, information, outliers)
     if not fit.p_value < MISFIT:
         warnings += fit.objective.instability(u)
+    for term in fit.objective.terms:
+        warnings += term.reversal(fit.values)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
     warnings += because.values()
     for name, estimate in fit.parameters.items():

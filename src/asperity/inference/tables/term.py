@@ -341,6 +341,19 @@ class LockInTerm(DataTerm):
             f"{named('K')} and {named('D0')}, or take more observables or points"
         ]
 
+    def reversal(self, values: Mapping[str, float]) -> list[str]:
+        """As in `DataTerm`: rows in whose response slip would reverse."""
+        function = self._functions["coarse"]
+        rows = np.flatnonzero(function.reverses(parameters_at(self.fixed, values, function)))
+        if not rows.size:
+            return []
+        names = self.table.row_names
+        return [
+            "with these estimates slip would reverse for part of the period in the response of "
+            f"{rows.size} of {len(names)} rows, the first of them {names[rows[0]]}: the law slips "
+            "forwards only, and describes them wrongly; leave these rows out"
+        ]
+
     def _small_errors(self, residuals: Residuals, information: Float) -> list[str]:
         """Sentences on readings that decide the fit by uncertainties far below the others."""
         table, decisive = self.table, leverages(residuals.jacobian, information) > _DECISIVE

@@ -19,11 +19,11 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import jit_large, spare_mappings
-from asperity.arrays import Float
+from asperity.arrays import Bool, Float
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.laws.consistency import checked_law
-from asperity.loads import Modulation
+from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.derivatives.fourier_orbits import (
     FastOrbits,
@@ -49,13 +49,20 @@ from asperity.orbit.derivatives.parametrised import (
     load_values,
 )
 from asperity.orbit.outcome import Outcome
+from asperity.orbit.search import METHODS, find_orbits
+from asperity.orbit.solution import SearchOptions
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
+from asperity.slider import QuasiStatic
 from asperity.slider.parameters import law_from
 from asperity.slider.problem import motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
 _FEWEST = 4
+
+
+#: Methods that take milliseconds a point.
+_QUICK = ("fourier", "shooting", "series", "collocation")
 
 
 class ResponseFunction:
@@ -223,6 +230,30 @@ class ResponseFunction:
             self._check_known(known, points or 1, traced=_traced(padded))
         numbers = {n: np.asarray(v)[: points or 1] for n, v in padded.items()}
         return growth_of(self.equations, numbers, known)
+
+    @typed
+    def reverses(self, parameters: Mapping[str, ArrayLike]) -> Bool:
+        """Whether slip would reverse, see `PeriodicResponse.reverses`.
+
+        False where no orbit is found without following branches, and without inertia, damping and
+        shear force, where only slip forwards lowers the interface force.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array
+            As for a call.
+
+        Returns
+        -------
+        bool array, shape (points,)
+        """
+        padded, points = self._padded(parameters)
+        numbers = {n: np.asarray(v)[: points or 1] for n, v in padded.items()}
+        problem = self.equations.problem(numbers)
+        if isinstance(problem.system, QuasiStatic) and isinstance(problem.load, Harmonic):
+            return np.zeros(points or 1, bool)
+        quick = tuple(m for m in METHODS if m.name in _QUICK)
+        return find_orbits(problem, SearchOptions(2), quick).reversal_margin < 0
 
     def _orbits(
         self,

@@ -271,7 +271,15 @@ def read_orbit(problem: Problem, orbit: Orbit, harmonics: int) -> Observables:
             rate = spectral_abscissa(values.jacobian[..., k])
             growth[k] = (weights[..., k] * rate).sum()
     return Observables(
-        mean, phasors, monodromy, log_scale, log_determinant, exponent, growth, orbit.start
+        mean,
+        phasors,
+        monodromy,
+        log_scale,
+        log_determinant,
+        exponent,
+        growth,
+        orbit.start,
+        values.reversal_margin.min((0, 1)),
     )
 
 

@@ -322,7 +322,8 @@ def fourier_observables(
     system = problem.system
     cycle = load_cycle(problem, len(orbit.zero_mean[0]), orbit.grading)
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
-    J = jacobian_on(system, cycle, together(orbit.mean, orbit.zero_mean))
+    states = together(orbit.mean, orbit.zero_mean)
+    J = jacobian_on(system, cycle, states)
     trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
     floquet = floquet_form(per_tau(cycle, J), cycle.integral)
     error = orbit_error(system, cycle, orbit, harmonics)
@@ -336,6 +337,7 @@ def fourier_observables(
         floquet.exponent,
         jnp.full_like(mean, jnp.inf),
         orbit.start,
+        system.reversal_margin(jnp.stack(states), cycle.at).min(0),
     )
     return observables, jnp.where(floquet.converged, error, jnp.inf)
 

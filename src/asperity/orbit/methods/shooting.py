@@ -376,19 +376,21 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
     n, points = start.shape
 
     def body(k: Array, carry: tuple) -> tuple:
-        flow, spectrum, trace, slips = carry
+        flow, spectrum, trace, slips, margin = carry
         at = problem.load.at(steps.phases[k, 0])
         _, force = problem.system.force_split(start, flow[0] - start, at)
         weights = steps.spectrum[k]
         spectrum = spectrum + weights[:, None] * force
         trace = trace + weights[0] * _trace(problem, steps.phases[k, 0], flow[0])
         slips = slips & jnp.isfinite(problem.system.log_slip(flow[0], at))
-        return _advance(problem, steps, k, flow), spectrum, trace, slips
+        margin = jnp.minimum(margin, problem.system.reversal_margin(flow[0], at))
+        return _advance(problem, steps, k, flow), spectrum, trace, slips, margin
 
     identity = jnp.eye(n)[:, :, None] * jnp.ones(points)
     nothing = jnp.zeros((steps.spectrum.shape[1], points)), jnp.zeros(points)
-    (end, monodromy), spectrum, trace, slips = jax.lax.fori_loop(
-        0, steps.number, body, ((start, identity), *nothing, jnp.ones(points, dtype=bool))
+    least = jnp.ones(points, dtype=bool), jnp.full(points, jnp.inf)
+    (end, monodromy), spectrum, trace, slips, margin = jax.lax.fori_loop(
+        0, steps.number, body, ((start, identity), *nothing, *least)
     )
     inverse = solve_columns(identity - monodromy, identity)
     step = (inverse * (end - start)[None]).sum(1)
@@ -405,6 +407,7 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
         jnp.full_like(monodromy, jnp.nan),
         zero,
         start,
+        margin,
     )
     # An interface that sticks for part of the period has kinks, which no high order resolves.
     change = jnp.where(slips, change, jnp.inf)

@@ -253,4 +253,5 @@ def _observables(
         np.full((*monodromy.shape, 1), np.nan),
         none,
         start[:, None],
+        none + np.inf,
     )
