@@ -6,12 +6,14 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from asperity.errors import InputError, require
+
+T = TypeVar("T")
 
 #: One thread for XLA and for the linear algebra of NumPy: sums over several threads differ in their
 #: last bits from sums in one, and more threads than cores slow all of them. The CPU, as in
@@ -49,7 +51,10 @@ def process_count(value: int, name: str) -> int:
 
 
 def kept_processes(count: int) -> Any:
-    """An executor of `count` processes, each with one thread, which stay for the next caller."""
+    """An executor of `count` processes, each with one thread.
+
+    They stay for the next call from the same thread, and end with this thread.
+    """
     from loky import get_reusable_executor
 
     # loky does not fork: the fork of a process that runs JAX hangs.
@@ -60,6 +65,16 @@ def kept_processes(count: int) -> Any:
         initializer=_begin,
         initargs=(os.getpid(),),
     )
+
+
+#: loky keeps processes for the thread that takes them; this thread does not end.
+_TAKER = ThreadPoolExecutor(1, "asperity-process")
+
+
+def in_kept_process(function: Callable[..., T], *arguments: Any) -> T:
+    """Result of a function in one process that stays for callers in any thread."""
+    result: T = _TAKER.submit(kept_processes, 1).result().submit(function, *arguments).result()
+    return result
 
 
 @contextmanager

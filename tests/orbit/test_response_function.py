@@ -1,5 +1,8 @@
 """The differentiable response: derivatives against differences, outcomes, one program for all."""
 
+import os
+from threading import Thread
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 from asperity import Slider, periodic_response, perturbation_response, response_function
+from asperity._processes import in_kept_process
 from asperity.errors import InputError
 from asperity.laws import (
     ElastoPlastic,
@@ -442,6 +446,16 @@ def test_derivatives_at_orbits_of_the_search():
     own = computed[np.arange(4), np.arange(4)]
     error = np.abs(own - (4 * fine - coarse) / 3)
     assert (error < SEARCHED * np.abs(computed).max(0)).all()
+
+
+def test_searches_of_programs_share_a_process():
+    """Compiled programs call the search in threads of their own, which end after the call."""
+    processes = []
+    for _ in range(2):
+        call = Thread(target=lambda: processes.append(in_kept_process(os.getpid)))
+        call.start()
+        call.join()
+    assert processes[0] == processes[1] != os.getpid()
 
 
 @pytest.mark.long

@@ -22,7 +22,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity._processes import kept_processes
+from asperity._processes import in_kept_process
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.arrays import Bool, Complex, Float
@@ -300,8 +300,7 @@ def _searched_response(
         values = {n: np.asarray(v) for n, v in parameters.items()}
         # A program of XLA for the CPU that calls another program may deadlock: the search runs in a
         # separate process, which starts at its first use.
-        submit = kept_processes(1).submit
-        return submit(_response, program, values, np.asarray(wanted), derivatives).result()
+        return in_kept_process(_response, program, values, np.asarray(wanted), derivatives)
 
     def search(parameters: Any) -> Any:
         return jax.pure_callback(call, shapes, parameters, wanted, vmap_method="sequential")
