@@ -264,6 +264,10 @@ class TestElastoPlastic:
         with pytest.raises(InputError, match="got none for K, epsilon"):
             self.model(given)
 
+    def test_unknown_names_of_derivatives_are_refused(self):
+        with pytest.raises(InputError, match="names must have known names, got 'lamda'; did you"):
+            self.model.value_and_jacobian(self.parameters, names=["A", "lamda"])
+
     def test_parameters_without_axes_give_values_without_axes(self):
         values = self.model(self.parameters | {"V": 1e-6, "epsilon": 0.24})
         assert values.mean_friction.shape == ()

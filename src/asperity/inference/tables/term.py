@@ -396,7 +396,8 @@ class LockInTerm(DataTerm):
         function = self._function(coarse=self.coarse)
         given = parameters_at(self.fixed, free, function)
         known = self._nearest(free) if self.searches else None
-        wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
+        named = ["epsilon" if n == "eps_ratio" else n for n in free]
+        wanted = [n for n in named if n in function.parameters]
         values, slopes = function.value_and_jacobian(
             given, known, motions=every or None, every=every, names=wanted
         )

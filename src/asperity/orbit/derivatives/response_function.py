@@ -184,6 +184,7 @@ class ResponseFunction:
             point to the parameter at the same point. The derivative by a parameter that all points
             share is the sum over the points.
         """
+        self._check_names("names", names or ())
         padded, points = self._padded(parameters)
         orbits = self._orbits(padded, points or 1, known, every=every, motions=motions)
         whole, table = _differentiated(padded, orbits)
@@ -301,6 +302,15 @@ class ResponseFunction:
             )
         return _Orbits(program.without_search, fast, None, searched)
 
+    def _check_names(self, argument: str, given: Collection[str]) -> None:
+        """Refuse names of parameters that the equations do not have."""
+        known = self.parameters
+        for name in given:
+            if name not in known:
+                raise InputError(
+                    f"{argument} must have known names, got '{name}'; {closest(name, known)}"
+                )
+
     def _check_known(self, known: KnownOrbits, points: int, *, traced: bool) -> None:
         """Refuse known orbits that this call cannot take as initial guesses."""
         if traced or not self._program.search or self._program.multipliers:
@@ -322,12 +332,7 @@ class ResponseFunction:
         """
         equations = self._program.equations
         given = self._defaults | dict(parameters)
-        for name in given:
-            if name not in equations.names:
-                raise InputError(
-                    f"parameters must have known names, got '{name}'; "
-                    f"{closest(name, equations.names)}"
-                )
+        self._check_names("parameters", given)
         missing = [n for n in equations.names if n not in given and n not in equations.optional]
         if missing:
             raise InputError(
