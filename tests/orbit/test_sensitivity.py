@@ -7,7 +7,7 @@ import pytest
 
 from asperity import Slider, periodic_response, perturbation_response, sensitivities
 from asperity.errors import InputError
-from asperity.laws import ElastoPlastic, law_parameters
+from asperity.laws import CutOff, ElastoPlastic, law_parameters
 
 pytestmark = pytest.mark.slow
 
@@ -205,6 +205,30 @@ def test_bad_input_is_refused(case):
     chosen = slider(name, numbers_of(name, DRIVES[name][0]))
     with pytest.raises(InputError, match="epsilon must be at least 0 and below 1"):
         sensitivities(chosen, velocity=1e-6, epsilon=1.0, frequency=120.0)
+
+
+@pytest.mark.long  # compiles equations of another law
+def test_multipliers_of_an_orbit_that_sticks_have_no_derivatives():
+    """The Jacobian jumps at instants that move with the parameters."""
+    law = CutOff(**(BASE | {"V1": 6e-8, "V2": 1.5e-6}))
+    point = {"velocity": 6e-8, "frequency": 7.0, "epsilon": 0.75}
+    machine = Slider(law, spring=MACHINE["K"], load=MACHINE["W0"])
+    response = periodic_response(machine, **point, waveform=64)
+    sticks = np.isneginf(response.waveform[1])
+    assert sticks.any()
+    assert not sticks.all()
+    result = sensitivities(machine, **point)
+    assert result.converged
+    counts = np.array(result.parameters) != "M"
+    assert np.isnan(result.log_multipliers[:, counts]).all()
+    # Mean and harmonics depend on the Jacobian alone.
+    step = 1e-3
+    moved = point | {"epsilon": point["epsilon"] * (1 + step * np.array([1.0, -1.0, 0.5, -0.5]))}
+    mean = periodic_response(machine, **moved).mean_friction
+    coarse, fine = (mean[0] - mean[1]) / (2 * step), (mean[2] - mean[3]) / step
+    expected = (4 * fine - coarse) / 3 / point["epsilon"]
+    at = result.parameters.index("epsilon")
+    assert result.mean_friction[at] == pytest.approx(expected, rel=DIFFERENCES)
 
 
 @pytest.mark.long  # compiles equations of rigid asperities

@@ -6,7 +6,7 @@ orbit is -D_Y^-1 D_p: the linear equations of a Newton step, for all parameters 
 
 The derivative of a multiplier m is sum_i w_i (dT_i) v_i / (w_i T_i v_i), where the right
 eigenvector v and the left eigenvector w of the monodromy matrix T_M ... T_1 are carried along the
-transfer maps T_i.
+transfer maps T_i. It needs a Jacobian that is continuous along the orbit.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from asperity.orbit.mesh.equations import (
 )
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.outcome import Outcome
-from asperity.slider.pointwise import curvature_along, slopes_along
+from asperity.slider.pointwise import PointValues, curvature_along, slopes_along
 from asperity.slider.problem import Problem
 
 #: Number of right-hand sides that are solved together; shorter sets are padded.
@@ -72,7 +72,7 @@ def orbit_derivatives(
     harmonics : int
     logs : complex array, shape (size, points), optional
         Logarithms of the multipliers, to add their derivatives, which are NaN where the mesh does
-        not resolve the multipliers.
+        not resolve the multipliers, and where the interface sticks.
     names : collection of str, optional
         Parameters with derivatives; all by default. Derivatives by other parameters are zero.
 
@@ -98,7 +98,8 @@ def orbit_derivatives(
         columns = [np.moveaxis(np.stack([mean, *phasors.real, *phasors.imag]), 0, -1)]
         if logs is not None:
             linearised = values.jacobian, response
-            columns += _multiplier_columns(problem, orbit, linearised, directions, changes, logs)
+            moved = _multiplier_columns(problem, orbit, linearised, directions, changes, logs)
+            columns.append(np.where(_sticks(values)[:, None], np.nan, moved))
         part = np.concatenate(columns, axis=-1)
     table[[name in given for name in equations.names]] = part
     return table
@@ -161,10 +162,11 @@ def _multiplier_columns(
     directions: Problem,
     changes: Float,
     logs: Complex,
-) -> list[Float]:
-    """Changes of the logarithms of the multipliers, real and imaginary parts.
+) -> Float:
+    """Changes of the logarithms of the multipliers, (directions, points, parts).
 
-    `linearised` are the Jacobian and the response of the slopes to a change at the left node.
+    The real parts come first, then the imaginary ones. `linearised` are the Jacobian and the
+    response of the slopes to a change at the left node.
     """
     (jacobian, response), (size, points) = linearised, logs.shape
     # Two multipliers: the smaller is lost in the round-off of the larger; Liouville's sum gives it.
@@ -202,7 +204,17 @@ def _multiplier_columns(
         gap[1] = gap[0]
     result = np.where(gap < _MULTIPLIER_GAP, result, np.nan)
     both = np.concatenate([result.real, result.imag], axis=1)
-    return [np.moveaxis(both, 1, 2)]
+    return np.moveaxis(both, 1, 2)
+
+
+def _sticks(values: PointValues) -> Bool:
+    """Whether the interface sticks for a part of the period, shape (points,).
+
+    The Jacobian jumps where it begins and ends to stick. These instants move with the parameters,
+    which changes the multipliers, and which no derivative of the Jacobian contains. Mean and
+    harmonics depend on the Jacobian alone.
+    """
+    return np.isneginf(values.log_slip).any((0, 1))
 
 
 def _eigenvectors(maps: Float, logs: Complex) -> tuple[Complex, Complex, Float]:

@@ -456,11 +456,11 @@ def response_function(
     Derivatives at orbits of the search are those of collocation on 216, 648 or 1,944 intervals: the
     fewest on which mean and harmonics agree with those of the search to 1e-10. Their error is about
     1e-7 of the largest derivative of an output, 1e-5 where the interface sticks (`cut-off`) and
-    slip is sharp. Second derivatives at these orbits, within JAX's transformations, are NaN. A
-    direct search takes its values from these meshes too: from the first mesh that agrees with a
-    mesh of a third as many intervals so well that the error of the finer mesh is below 1e-10. Where
-    the finest mesh differs from the search by more than 1e-8, the outcome is
-    `Outcome.NOT_RESOLVED`.
+    slip is sharp; derivatives of multipliers are NaN where it sticks. Second derivatives at these
+    orbits, within JAX's transformations, are NaN. A direct search takes its values from these
+    meshes too: from the first mesh that agrees with a mesh of a third as many intervals so well
+    that the error of the finer mesh is below 1e-10. Where the finest mesh differs from the search
+    by more than 1e-8, the outcome is `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
     if modulation is not None:

@@ -40,7 +40,9 @@ class Sensitivities:
         radiation damping: the equations of rigid asperities do not have it.
     log_multipliers : complex array, shape (..., states, parameters)
         Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
-        with the positive argument comes first.
+        with the positive argument comes first. NaN where the mesh does not resolve the multipliers,
+        and where the interface sticks for a part of the period (`cut-off`): their changes with the
+        instants at which it begins and ends to stick are not computed.
     """
 
     parameters: tuple[str, ...]
