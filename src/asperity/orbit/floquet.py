@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.algebra.mirrored_grid import antiderivative
+from asperity.algebra.fourier_grid import antiderivative
 from asperity.algebra.small_systems import (
     Matrix,
     add,
@@ -142,7 +142,7 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
     J : matrix of arrays, shape (nodes, points)
         Derivatives of the rates to the states, per unit of tau, on that grid.
     integral : array, shape (nodes, nodes)
-        The matrix of `asperity.algebra.mirrored_grid.grid`.
+        The matrix of `asperity.algebra.fourier_grid.grid`.
     factor : bool
         Whether P is wanted, which takes about twice as many steps.
 

@@ -16,7 +16,7 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.contraction import contracted, implicit_solution
-from asperity.algebra.mirrored_grid import grid
+from asperity.algebra.fourier_grid import grid
 from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points
 from asperity.orbit.derivatives.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.floquet import floquet_form, log_multipliers_along

@@ -34,7 +34,7 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations
-from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
+from asperity.algebra.fourier_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation, Harmonic

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.mirrored_grid import grid, interpolation
+from asperity.algebra.fourier_grid import grid, interpolation
 from asperity.algebra.small_systems import (
     Matrix,
     apply,

@@ -27,7 +27,7 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.algebra.mirrored_grid import interpolation
+from asperity.algebra.fourier_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import solve_columns, value_and_jacobian
 from asperity.arrays import Bool, Complex, Float, Index

@@ -1,4 +1,4 @@
-"""Grids over a period: one that is symmetric about zero, integration, and interpolation."""
+"""The grid of Fourier collocation, symmetric about zero: integration and interpolation on it."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.algebra.mirrored_grid import antiderivative, grid
+from asperity.algebra.fourier_grid import antiderivative, grid
 
 
 @pytest.mark.parametrize("nodes", [8, 24, 32])
