@@ -122,6 +122,9 @@ def map(
         unresolved
         and f"the boundary bends too much for the grid at {count_text(unresolved, 'place')}, where "
         "it is not known to 1e-4; refine the grid",
+        record["reverses"]
+        and f"slip would reverse at {count_text(record['reverses'], 'point')}, of a law that slips "
+        f"forwards only; the variable 'reverses' of {out} says where",
         failed
         and f"{failed} of {record['points']} points have no response; the variable 'result' of "
         f"{out} says why",
@@ -157,6 +160,7 @@ def _record(dataset: xarray.Dataset, out: Path) -> dict[str, Any]:
         "stable": stable,
         "unstable": int(converged.sum()) - stable,
         "failed": int((~converged).sum()),
+        "reverses": int(dataset["reverses"].values.sum()),
         "x": dataset.attrs["x"],
         "y": dataset.attrs["y"],
         "boundaries": boundary_lines(dataset),

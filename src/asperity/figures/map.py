@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from asperity.arrays import Float
+from asperity.arrays import Bool, Float
 from asperity.figures.style import new_figure, reason_of_gaps
 from asperity.parameters.arguments import typed
 from asperity.study.map.dataset import critical_line
@@ -40,6 +40,13 @@ _FAILED: dict[str, Any] = {
     "facecolor": "#D9D9D9",
     "edgecolor": "#909090",
     "hatch": "xxxx",
+    "linewidth": 0,
+}
+
+_REVERSES: dict[str, Any] = {
+    "facecolor": "none",
+    "edgecolor": "#404040",
+    "hatch": "...",
     "linewidth": 0,
 }
 
@@ -108,7 +115,9 @@ def draw_plane(axis: Axes, dataset: xarray.Dataset, show: str) -> QuadMesh:
         rasterized=True,
         shading="flat",
     )
-    _draw_failed(axis, dataset, grid)
+    for name, look in (("converged", _FAILED), ("reverses", _REVERSES)):
+        region = dataset[name].values.astype(bool)
+        _hatch(axis, grid, ~region if name == "converged" else region, look)
     _draw_boundary(axis, dataset, units)
     if (line := critical_line(dataset)) is not None:
         halo = patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)
@@ -160,6 +169,8 @@ def keys(dataset: xarray.Dataset) -> list[Any]:
         entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
     if not dataset["converged"].values.all():
         entries.append(Patch(label="no response", **_FAILED))
+    if dataset["reverses"].values.any():
+        entries.append(Patch(label="slip would reverse", **_REVERSES))
     return entries
 
 
@@ -209,13 +220,12 @@ def _colour_map(show: str) -> Any:
     return cm.batlow_r if show == "delta_mu" else cm.batlow
 
 
-def _draw_failed(axis: Axes, dataset: xarray.Dataset, grid: list[Float]) -> None:
-    failed = ~dataset["converged"].values.astype(bool)
-    if failed.any():
+def _hatch(axis: Axes, grid: list[Float], region: Bool, look: dict[str, Any]) -> None:
+    if region.any():
         hatched = axis.contourf(
-            *grid, failed.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xxxx"]
+            *grid, region.astype(float), levels=[0.5, 1.5], colors="none", hatches=[look["hatch"]]
         )
-        hatched.set_edgecolor(_FAILED["edgecolor"])
+        hatched.set_edgecolor(look["edgecolor"])
         hatched.set_linewidth(0.0)
 
 

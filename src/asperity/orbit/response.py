@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 #: Variables of the dataset with one value a point.
 _VARIABLES = (
     *("mean_friction", "delta_mu", "mu_ss", "mu1", "mu2", "phase1", "phase2", "floquet_max"),
-    *("mode", "mode_frequency", "growth_rate", "stable", "converged", "result"),
+    *("mode", "mode_frequency", "growth_rate", "stable", "reverses", "converged", "result"),
 )
 
 

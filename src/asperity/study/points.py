@@ -322,6 +322,11 @@ class Answers:
         return np.asarray(self.outcome == SweepOutcome.CONVERGED)
 
     @property
+    def reverses(self) -> Bool:
+        """Responses on which slip would reverse, see `asperity.orbit.PeriodicResponse`."""
+        return self.converged & np.asarray(self.detail < 0)
+
+    @property
     def failed(self) -> int:
         """Number of points without an answer."""
         return int(np.count_nonzero(~self.converged))

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import xarray
+from matplotlib.contour import ContourSet
 
 from asperity.figures.map import KIND_LINES, axis_unit, draw_map, keys, label
 from asperity.figures.style import style
@@ -124,6 +125,7 @@ def planted(law="rice-ruina", **changes) -> xarray.Dataset:
     dims, units = ("K", "epsilon"), {"units": "1", "long_name": "x"}
     data = dict.fromkeys(SHOWN, (dims, values, units))
     data |= {"stable": (dims, values < 0, units), "converged": (dims, values < 9, units)}
+    data["reverses"] = (dims, values > 9, units)
     kinds = np.array(["Neimark-Sacker", "Neimark-Sacker", "period doubling", "period doubling"])
     data |= {
         "boundary_line": ("boundary_point", [0, 0, 0, 0], units),
@@ -179,6 +181,21 @@ def test_the_unmodulated_limit_is_not_drawn_by_chords_between_the_points_of_the_
     np.testing.assert_allclose(Kc, 0.1 / length, rtol=1e-12)
     middle = (length[1:] + length[:-1]) / 2
     np.testing.assert_allclose((Kc[1:] + Kc[:-1]) / 2, 0.1 / middle, rtol=1e-4)
+
+
+def test_points_at_which_slip_would_reverse_are_hatched_and_named() -> None:
+    reverses = np.zeros((3, 4), bool)
+    reverses[1:, 2:] = True
+    units = {"units": "1", "long_name": "x"}
+    dataset = planted(reverses=(("K", "epsilon"), reverses, units))
+    with style():
+        plain, marked = (draw_map(d) for d in (planted(), dataset))
+    hatched = [
+        [c.hatches for c in figure.axes[0].collections if isinstance(c, ContourSet)]
+        for figure in (plain, marked)
+    ]
+    assert hatched == [[], [["..."]]]
+    assert [entry.get_label() for entry in keys(dataset)][-1] == "slip would reverse"
 
 
 def test_points_without_response_are_hatched_and_named() -> None:

@@ -243,6 +243,14 @@ def test_an_axis_of_another_modulation(numbers, pmma) -> None:
     assert lost["converged"].sum() == 5
 
 
+def test_points_at_which_slip_would_reverse_are_marked(numbers, pmma) -> None:
+    """On a tilted exciter the shear force on the slider exceeds that of the spring."""
+    x, y = Axis("epsilon", 0.1, 0.5, 2), Axis("tilt", 0.0, 0.8, 2)
+    dataset = response_map("rice-ruina", numbers | {"K": pmma.K}, x=x, y=y, boundary=False)
+    assert dataset["converged"].all()
+    assert dataset["reverses"].values.tolist() == [[False, False], [False, True]]
+
+
 def test_a_map_beyond_memory_is_refused_before_anything(numbers, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(targets, "free_memory", lambda: 16e9)
     draw = np.random.default_rng(0)

@@ -145,6 +145,7 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
         "regions": region_names(result),
         "unmodulated": critical_line(result),
         "failed": int(failed.sum()),
+        "reverses": int(result["reverses"].values.sum()),
         "reasons": list(reasons)[:5],
         "boundaries": lines,
         "not_located": int((result["boundary_line"].values < 0).sum()),

@@ -44,6 +44,7 @@ def as_dataset(
         # Strings of fixed width: NetCDF has no Python objects.
         ("mode", bifurcation_kinds(grid).astype(str)),
         ("stable", is_stable(grid)),
+        ("reverses", grid.reverses),
         ("converged", grid.converged),
         ("result", grid.result.astype(str)),
     ):

@@ -148,6 +148,7 @@ export function create(page) {
       [...new Set((grid.boundaries || []).map(describeLine))].map((text) => key("boundary", text)),
       grid.boundaries === null || grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever there is an orbit." : "No stability boundary here: unstable everywhere."),
       grid.failed ? el("p", { class: "lost" }, `${grid.failed} of ${grid.count ** 2} points have no orbit: ${grid.reasons.join("; ")}`) : null,
+      grid.reverses ? el("p", {}, `At ${grid.reverses} of ${grid.count ** 2} points slip would reverse for part of the period, and this law slips forwards only.`) : null,
       grid.not_located ? el("p", {}, `At ${count(grid.not_located, "place")} stability changes, but no boundary was located there.`) : null);
   }
 
