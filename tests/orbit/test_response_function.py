@@ -25,10 +25,11 @@ from asperity.laws import (
 from asperity.loads import modulated
 from asperity.orbit import Outcome
 from asperity.orbit.derivatives import (
+    mesh_orbits,
     mesh_search as search_module,
     response_function as response_module,
 )
-from asperity.orbit.derivatives.mesh_search import search_orbits
+from asperity.orbit.derivatives.mesh_search import SearchedOrbits, search_orbits
 from asperity.orbit.derivatives.parametrised import ParametrisedProblem
 from asperity.slider import QuasiStatic
 from references.populations import population
@@ -460,6 +461,24 @@ def test_searches_of_programs_share_a_process():
         call.start()
         call.join()
     assert processes[0] == processes[1] != os.getpid()
+
+
+def test_points_that_fill_up_a_program_are_not_searched_for(monkeypatch):
+    searched = []
+
+    def search(equations, harmonics, parameters, wanted):
+        searched.append(wanted.tolist())
+        outcome = np.where(wanted, int(Outcome.FOLDED), int(Outcome.NO_ORBIT))
+        return SearchedOrbits(outcome, [])
+
+    monkeypatch.setattr(mesh_orbits, "search_orbits", search)
+    program = response_function("rice-ruina")._program
+    parameters = {n: np.full(4, BASE.get(n, 1.0)) for n in program.equations.names}
+    parameters["V"] = np.array([3e-6, 1e-6, 2e-6, 2e-6])
+    wanted = np.array([True, False, True, True])
+    _, outcome, _ = mesh_orbits._response(program, parameters, wanted, True)
+    assert searched == [[True, False, True, False]]
+    assert (outcome == np.where(wanted, Outcome.FOLDED, Outcome.NO_ORBIT)).all()
 
 
 @pytest.mark.long

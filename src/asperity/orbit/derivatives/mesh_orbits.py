@@ -332,14 +332,20 @@ def _response(
     The derivatives are of shape (parameters, points, count), without parameters if not requested.
     """
     equations, points, count = program.equations, len(wanted), program.columns
-    orbits = search_orbits(equations, program.harmonics, parameters, wanted)
+    # The points that fill up a program equal its last point: each point is searched for once.
+    index, each = np.flatnonzero(wanted), np.arange(points)
+    rows = np.stack(list(parameters.values()))[:, index]
+    _, first, of_first = np.unique(rows, axis=1, return_index=True, return_inverse=True)
+    each[index] = index[first[of_first]]
+    once = wanted & (each == np.arange(points))
+    orbits = search_orbits(equations, program.harmonics, parameters, once)
     columns = np.zeros((points, count))
     table = np.zeros((len(equations.names) * derivatives, points, count))
     for index, part in orbits.parts:
         columns[index] = values_of(part, multipliers=program.multipliers).columns
     if derivatives:
         add_derivatives(table, program, parameters, orbits)
-    return columns, np.asarray(orbits.outcome), table
+    return columns[each], np.asarray(orbits.outcome)[each], table[:, each]
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
