@@ -33,6 +33,7 @@ from asperity.orbit.derivatives.parametrised import (
     ParametrisedProblem,
     Program,
     ResponseValues,
+    only_where,
 )
 from asperity.orbit.mesh.equations import (
     collocated,
@@ -359,8 +360,8 @@ def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[An
     parameters, wanted = primals
     fixed = jax.lax.stop_gradient(parameters)
     columns, outcome, table = _searched_response(program, fixed, wanted, derivatives=True)
-    # Second derivatives are unknown for both.
-    point = sum(parameters.values())
+    # Second derivatives are unknown for both at the points of the search.
+    point = sum(only_where(wanted, parameters).values())
     columns, table = _without_derivatives(columns, point), _without_derivatives(table, point)
     names = program.equations.names
     change = sum(table[k] * tangents[0][n][:, None] for k, n in enumerate(names))
