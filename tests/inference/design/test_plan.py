@@ -7,6 +7,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.inference import design, plan_of, read_plan
+from asperity.inference.design.candidates import candidates_of
 from asperity.inference.design.plan import expected_values
 
 PLAN = {
@@ -237,3 +238,14 @@ def test_an_unreadable_file_is_one_sentence(tmp_path, content, rule):
         path.write_text(content)
     with pytest.raises(InputError, match=rule):
         read_plan(path)
+
+
+def test_a_point_at_which_slip_would_reverse_is_no_candidate():
+    """At 200 Hz the second harmonic of the load meets the resonance on the asperities."""
+    ranges = {"V": "1 um/s", "epsilon": [0.1, 0.6], "frequency": "200 Hz"}
+    fixed = {"K": "0.3 N/um", "M": "1.6 kg"}
+    plan = plan_of(changed(ranges=ranges, fixed=fixed, inertia=True, draws=0))
+    found = candidates_of(plan, lambda *_: None)
+    assert found.points["epsilon"].tolist() == [0.1]
+    (reason,) = found.left_out
+    assert reason.startswith("slip would reverse")

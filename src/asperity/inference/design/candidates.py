@@ -1,7 +1,7 @@
 """Operating points of a plan at which the slider slides steadily, and predictions at these points.
 
 A reading needs a stable periodic response: an unstable response turns into stick-slip and is never
-measured.
+measured. Where slip would reverse, the law does not describe it.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ Progress = Callable[[int, int, str], None]
 
 #: Points per call of the compiled derivatives; progress is reported after each call.
 _BLOCK = 128
-#: Reason why a point with a periodic response is no candidate.
-UNSTABLE = "its periodic response is unstable: stick-slip"
+#: Reasons why a point with a periodic response is no candidate.
+_UNSTABLE = "its periodic response is unstable: stick-slip"
+_REVERSES = "slip would reverse in its response, and the law slips forwards only"
 _CUT = (":", ";", " epsilon = ")
 
 
@@ -149,7 +150,7 @@ def _reasons(
     values: Mapping[str, float],
     progress: Callable[[int, int], None],
 ) -> NDArray[np.str_]:
-    """Reasons why points have no stable response, shape (n,); empty where they have one."""
+    """Reasons why points have no response to be read, shape (n,); empty where they have one."""
     given = on_contacts({**plan.truth.fixed, **points, **values})
     reasons = np.full(len(points["V"]), "contact would be lost", dtype=object)
     kept = given["epsilon"] < 1
@@ -167,8 +168,9 @@ def _reasons(
         progress=progress,
     )
     failed = [_short(str(text)) for text in response.result]
-    steady = np.where(response.stable, "", UNSTABLE)
-    reasons[kept] = np.where(response.converged, steady, failed)
+    steady = np.where(response.stable, "", _UNSTABLE)
+    described = np.where(response.reverses, _REVERSES, steady)
+    reasons[kept] = np.where(response.converged, described, failed)
     return reasons
 
 
