@@ -124,6 +124,16 @@ def test_a_law_must_not_take_the_name_of_the_machine() -> None:
         law_parameters(Greedy)
 
 
+def test_a_law_with_a_static_field_is_refused():
+    """Tables and fits construct laws from numbers, and would take its default."""
+
+    class Settable(asp.laws.RiceRuina):
+        variant: str = eqx.field(static=True, default="a")
+
+    with pytest.raises(InputError, match=r"law\.variant must be a number.*class attribute"):
+        law_parameters(Settable)
+
+
 def test_every_output_is_an_attribute_of_the_response() -> None:
     # ln|m| of the leading multiplier is the maps' own: the response has all of them.
     for name in set(OUTPUTS) - {"log_multiplier"}:

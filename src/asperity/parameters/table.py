@@ -100,7 +100,8 @@ def law_parameters(law: type) -> Mapping[str, Parameter]:
     Raises
     ------
     InputError
-        If it is no such class, or a field has the name of a parameter of the experiment.
+        If it is no such class, or a field is static or has the name of a parameter of the
+        experiment.
     """
     require(dataclasses.is_dataclass(law), "law", "be the class of a law", shown(law))
     parameters: dict[str, Parameter] = {}
@@ -110,6 +111,12 @@ def law_parameters(law: type) -> Mapping[str, Parameter]:
             rule = "have a name that is free"
             got = f"'{name}', which is the {EXPERIMENT[name].meaning}"
             raise InputError(f"law.{name}", rule, got, f"rename the field of {law.__name__}")
+        if declared.metadata.get("static"):
+            rule, got = "be a number, as every field of a law", "a static field"
+            advice = (
+                f"make it a class attribute of {law.__name__}, and write a class for each value"
+            )
+            raise InputError(f"law.{name}", rule, got, advice)
         parameter = declared.metadata.get("parameter")
         # A field without declaration is a pure number.
         parameters[name] = parameter or Parameter(
