@@ -57,7 +57,7 @@ def test_a_shear_force_that_exceeds_the_spring_force(amplitude: float, reverses:
     assert odd.mean_friction == pytest.approx(mean(force), abs=1e-9)
     assert (force + shear(t)).min() < -0.05
     backwards = -odd_slip(force + shear(t), phi).min() / V
-    assert (backwards > 1e-12) == reverses
+    assert (backwards > 1e-10) == reverses
     assert forwards.converged
     assert (forwards.reverses, odd.reverses) == (reverses, False)
     assert ("slip would reverse" in forwards.result[()]) == reverses
@@ -67,7 +67,7 @@ def test_a_shear_force_that_exceeds_the_spring_force(amplitude: float, reverses:
 
 #: Velocity, epsilon, frequency, lambda, and whether slip would reverse: the slider swings on its
 #: asperities.
-POINTS = ((1.4e-6, 0.76, 426.0, 3.8e-9, False), (3.4e-5, 0.845, 161.0, 4.2e-8, True))
+POINTS = ((1.4e-6, 0.76, 426.0, 3.8e-9, False), (3.3e-6, 0.947, 158.9, 4.38e-7, True))
 
 
 @pytest.mark.parametrize(("V", "epsilon", "frequency", "length", "reverses"), POINTS)

@@ -112,7 +112,7 @@ def test_a_step_to_no_load_loses_contact_at_once(physical) -> None:
 
 
 def test_reversal_is_named_where_the_law_has_none(physical) -> None:
-    """It is where a law that is odd in the force would slip backwards at 1e-12 of the drive."""
+    """It is where a law that is odd in the force would slip backwards at 1e-10 of the drive."""
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
     motion = transient(p.slider, programme)
@@ -124,7 +124,7 @@ def test_reversal_is_named_where_the_law_has_none(physical) -> None:
     law = p.slider.law
     strength = law.mu0 + law.B * motion.states[-1, -1]
     backwards = law.V0 / 1e-6 * np.exp((-motion.force[-1] / 7.0 - strength) / law.A)
-    assert backwards == pytest.approx(1e-12, rel=1e-4)
+    assert backwards == pytest.approx(1e-10, rel=1e-4)
     assert finite(motion)
 
 
@@ -163,3 +163,27 @@ def test_a_termination_within_the_spacing_of_doubles_has_a_time() -> None:
     assert motion.termination is not None
     assert finite(motion)
     assert 1000 < motion.time[-1] <= motion.termination.time < 2000
+
+
+def test_a_small_negative_force_does_not_end_a_run() -> None:
+    """A slider that swings on its asperities; SciPy with slip that is odd in the force."""
+    A, B, D0, V, mu0, length, frequency = 0.013, 0.026, 4e-7, 1e-6, 0.5, 7e-7, 120.0
+    law = asp.laws.ElastoPlastic(mu0=mu0, A=A, B=B, D0=D0, V0=V, lambda_=length)
+    slider = asp.Slider(law, spring=2e5, mass=1.6, load=7.0)
+    programme = Programme(Modulate(8 / frequency, 0.5, frequency), load=7.0, velocity=V)
+    motion = transient(slider, programme, inertia=True)
+    assert motion.stopped is None
+
+    def rates(t, y):
+        force, v, friction, phi = y
+        slip = 2 * V * np.sinh(friction / A) * np.exp(-(mu0 + B * phi) / A)
+        net = force - (1 + 0.5 * np.cos(2 * np.pi * frequency * t)) * friction
+        ageing = V / D0 * np.exp(-phi) - v / D0
+        return [2e5 * (V - v) / 7.0, 7.0 * net / 1.6, (v - slip) / length, ageing]
+
+    start = motion.states[0] * np.array([1.0, V, 1.0, 1.0])
+    run = solve_ivp(
+        rates, (0, motion.time[-1]), start, "LSODA", motion.time, rtol=1e-11, atol=1e-13
+    )
+    assert run.y[2].min() < -0.02
+    np.testing.assert_allclose(motion.force / 7.0, run.y[0], atol=1e-7)
