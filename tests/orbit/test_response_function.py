@@ -11,7 +11,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
-from asperity import Slider, periodic_response, perturbation_response, response_function
+from asperity import (
+    Slider,
+    periodic_response,
+    perturbation_response,
+    response_function,
+    sensitivities,
+)
 from asperity._processes import in_kept_process
 from asperity.errors import InputError
 from asperity.laws import (
@@ -124,6 +130,24 @@ def test_derivatives_at_steady_sliding(law):
     linear = perturbation_response(slider, velocity=V, frequency=MACHINE["frequency"])
     first = jacobian["epsilon"].harmonics[:, 0]
     np.testing.assert_allclose(first, linear.transfer, rtol=1e-8)
+
+
+def test_derivatives_at_steady_sliding_where_the_fast_method_contracts_slowly_or_not():
+    own = {n: BASE[n] for n in law_parameters(RiceRuina)}
+    # Rates from 0.6 to 0.9 per radian, and 9.
+    frequency = np.array([0.2, 2.0, 2.4, 3.0])
+    given = own | MACHINE | {"K": 1e6, "V": 2e-6, "frequency": frequency, "epsilon": 0.0}
+    values, jacobian = response_function("rice-ruina", harmonics=1).value_and_jacobian(given)
+    assert (values.outcome == Outcome.CONVERGED).all()
+    np.testing.assert_allclose(values.harmonics, 0.0, atol=1e-30)
+    for name, expected in (("mu0", 1.0), ("A", np.log(2)), ("B", -np.log(2)), ("epsilon", 0.0)):
+        np.testing.assert_allclose(jacobian[name].mean_friction, expected, atol=1e-9)
+    slider = Slider(RiceRuina(**own), spring=1e6, load=MACHINE["W0"])
+    linear = perturbation_response(slider, velocity=2e-6, frequency=frequency)
+    np.testing.assert_allclose(jacobian["epsilon"].harmonics[:, 0], linear.transfer, rtol=1e-8)
+    # The modulus of a harmonic has no derivative where the harmonic vanishes.
+    drive = {"velocity": 2e-6, "epsilon": 0.0, "frequency": frequency}
+    assert np.isnan(sensitivities(slider, **drive).mu1[:, -1]).all()
 
 
 class TestElastoPlastic:

@@ -119,8 +119,9 @@ def fast_values(parameters: Parameters, fast: FastOrbits, program: Program) -> R
     return ResponseValues(mean, harmonics.T, logs.T, outcome)
 
 
-#: Iterations of a linear system in addition to those that the orbit took.
-_MORE_STEPS = 1
+#: Iterations of a linear system: the fewest in a round, as a round of a few may not come closer to
+#: the solution, and those in addition to the iterations of the orbit, one without modulation.
+_FEWEST_STEPS, _MORE_STEPS = 7, 1
 
 
 class FourierUnknowns(NamedTuple):
@@ -170,7 +171,7 @@ class FourierEquations(GridEquations):
         problem, _, steps = parameters
         J = self.jacobian(problem, unknowns)
         inverse = inverse_points(averaged(J, self.cycle(problem).share))
-        return (inverse, J), steps + _MORE_STEPS
+        return (inverse, J), jnp.maximum(steps + _MORE_STEPS, _FEWEST_STEPS)
 
     def residual(
         self,

@@ -28,7 +28,7 @@ from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, reme
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
 from asperity.orbit.methods.fourier_series import NODES, follows_steady_sliding, series_orbits
 from asperity.orbit.methods.from_transient import settled_orbits
-from asperity.orbit.observables import response_gap
+from asperity.orbit.observables import response_gap, without_round_off
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.orbit.solution import SearchOptions
@@ -289,7 +289,8 @@ class _MeshSearch:
         solved = solution.converged
         unresolved = int(Outcome.NOT_RESOLVED)
         self.result.outcome[self.index] = np.where(solved, unresolved, solution.outcome)
-        rows, numbers = np.flatnonzero(solved), solution.numbers[: 1 + self.harmonics]
+        rows = np.flatnonzero(solved)
+        numbers = without_round_off(solution.numbers[: 1 + self.harmonics])
         for some, orbits in followed_orbits(
             self.part, solution.orbit, rows, self.harmonics, MESHES, numbers
         ):
@@ -378,4 +379,4 @@ def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
     """Mean and harmonics of F/W0, shape (1 + harmonics, points)."""
     with np.errstate(all="ignore"):
         mean, phasors = mean_and_harmonics(collocated(problem, orbit), orbit, harmonics)
-    return np.concatenate([mean[None], phasors])
+    return without_round_off(np.concatenate([mean[None], phasors]))

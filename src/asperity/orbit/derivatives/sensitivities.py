@@ -13,6 +13,7 @@ from asperity.arrays import Bool, Complex, Float
 from asperity.loads import Modulation
 from asperity.orbit.derivatives.parametrised import ParametrisedProblem, ResponseValues
 from asperity.orbit.derivatives.response_function import ResponseFunction
+from asperity.orbit.observables import without_round_off
 from asperity.orbit.outcome import Outcome
 from asperity.parameters.arguments import typed
 from asperity.slider import Slider
@@ -36,8 +37,9 @@ class Sensitivities:
     converged : bool array, shape (...)
         False where there is no resolved orbit; the derivatives are NaN there.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
-        d(output)/d(parameter) in SI; phases in rad. NaN to lambda at lambda = 0 with inertia or
-        radiation damping: the equations of rigid asperities do not have it.
+        d(output)/d(parameter) in SI; phases in rad. NaN where a harmonic vanishes, as without
+        modulation, and to lambda at lambda = 0 with inertia or radiation damping: the equations of
+        rigid asperities do not have it.
     log_multipliers : complex array, shape (..., states, parameters)
         Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
         with the positive argument comes first. NaN where the mesh does not resolve the multipliers,
@@ -134,7 +136,9 @@ def sensitivities(
 
 def _outputs(values: ResponseValues, change: ResponseValues) -> Complex:
     """Derivatives of the outputs to one parameter, (points, outputs)."""
+    numbers = np.column_stack([values.mean_friction, values.harmonics])
+    harmonics = without_round_off(numbers.T)[1:].T
     with np.errstate(all="ignore"):  # NaN without an orbit, and where a harmonic vanishes
-        relative = change.harmonics / values.harmonics
-    growth, turn = relative.real * np.abs(values.harmonics), relative.imag
+        relative = change.harmonics / harmonics
+        growth, turn = relative.real * np.abs(harmonics), relative.imag
     return np.column_stack([change.mean_friction, growth, turn, change.log_multipliers])

@@ -431,8 +431,11 @@ _GRIDS = ((5.0, 24, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
 _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
-#: Rate per radian of a disturbance above which the iteration does not contract, from experience.
-LARGEST_CONTRACTING_RATE = 1.0
+#: Rate per radian of a disturbance above which the iteration does not contract fast enough: of
+#: 2,600 points of eight laws, drawn at random with rates from 0.75 to 1, it converged at 23, nearly
+#: all with epsilon below 1e-6. Without modulation the iteration takes a single step at any rate,
+#: but the linear systems of derivatives take many.
+LARGEST_CONTRACTING_RATE = 0.75
 
 
 class Fourier(Method):
