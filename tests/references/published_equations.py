@@ -134,7 +134,7 @@ class Printed:
         renewed = (plastic if self.ageing == "plastic" else v) * age / self.D0
         if self.ageing == "slip":
             return -renewed * np.log(renewed)
-        jump = self.alpha / self.B * log_load_rate * age if self.alpha else 0.0
+        jump = self.alpha / self.B * log_load_rate * age if np.any(self.alpha) else 0.0
         return 1 - renewed - jump
 
 
@@ -334,6 +334,48 @@ def expansion(p: Printed, epsilon: float = 1e-3) -> np.ndarray:
     return (4 * scaled(epsilon / 2) - scaled(epsilon)) / 3
 
 
+def derivatives(p: Printed, epsilon: float, names: tuple[str, ...]) -> np.ndarray:
+    """Derivatives of mean, c1 and c2 of F/W0 by logarithms, complex, shape (3, names + 1).
+
+    The logarithms are those of the parameters `names` and of epsilon. The equations, without mass,
+    are integrated together with their variational equations.
+    """
+    n, columns, tiny = len(p.steady), len(p.steady) + len(names) + 1, 1e-30
+
+    def moved(value: float, column: int) -> np.ndarray:
+        return value * (1 + 1j * tiny * (np.arange(columns) == column))
+
+    numbers = {name: moved(getattr(p, name), n + i) for i, name in enumerate(names)}
+    q, swing = dataclasses.replace(p, **numbers), moved(epsilon, columns - 1)
+
+    def rates(share: float, packed: np.ndarray) -> np.ndarray:
+        """By the share of the period: of states over `scale`, and of the integrals of the force."""
+        rows = packed.reshape(n + 5, 1 + columns)[:n]
+        state = p.scale[:, None] * (rows[:, :1] + 1j * tiny * rows[:, 1:])
+        rate = np.array(q.rates(share / q.frequency, state, swing)) / q.frequency
+        force, turn = q.mu + q.K * state[0] / q.W0, np.exp(-2j * np.pi * share * np.arange(3))
+        waves = [part * force for t in turn for part in (t.real, t.imag)]
+        result = np.concatenate([rate / p.scale[:, None], waves[:1], waves[2:]])
+        return np.column_stack([result[:, 0].real, result.imag / tiny]).ravel()
+
+    start = p.steady / p.scale
+    for _ in range(12):
+        packed = np.zeros((n + 5, 1 + columns))
+        packed[:n, 0], packed[:n, 1 : 1 + n] = start, np.eye(n)
+        run = solve_ivp(rates, (0, 1), packed.ravel(), "DOP853", rtol=1e-12, atol=1e-14)
+        last = run.y[:, -1].reshape(packed.shape)
+        apart = np.column_stack([last[:n, 0] - start, last[:n, 1 + n :]])
+        step, *changes = np.linalg.solve(np.eye(n) - last[:n, 1 : 1 + n], apart).T
+        if np.abs(step).max() < 1e-8:  # the next step would be round-off
+            break
+        start = start + step
+    else:
+        raise AssertionError("the reference integration found no periodic solution")
+    slopes = last[n:, 1 : 1 + n] @ np.transpose(changes) + last[n:, 1 + n :]
+    mean, *waves = slopes
+    return np.array([mean, 2 * (waves[0] + 1j * waves[1]), 2 * (waves[2] + 1j * waves[3])])
+
+
 class Shot(NamedTuple):
     """Periodic solutions; the first axis of every array is the operating points."""
 
@@ -481,6 +523,7 @@ class Reference(NamedTuple):
     Printed: type[Printed]
     printed: dict[str, type[Printed]]
     expansion: Callable[..., np.ndarray]
+    derivatives: Callable[..., np.ndarray]
     periodic_response: Callable[..., np.ndarray]
     multiple_shooting: Callable[..., Shot]
     disagreement: Callable[..., np.ndarray]
@@ -489,5 +532,11 @@ class Reference(NamedTuple):
 @pytest.fixture(scope="session")
 def reference() -> Reference:
     return Reference(
-        Printed, PRINTED, expansion, periodic_response, multiple_shooting, disagreement
+        Printed,
+        PRINTED,
+        expansion,
+        derivatives,
+        periodic_response,
+        multiple_shooting,
+        disagreement,
     )
