@@ -104,9 +104,10 @@ def periodic_response(
     Notes
     -----
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). Where converged,
-    mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12
-    to 1e-20 absolute; with inertia or several states of the law, those below 1e-6 to 1e-14, and
-    those below 1e-7 of the largest to 1e-15 of that).
+    mean, mu1, mu2 and multipliers are good to 1e-8 relative (harmonics below 1e-9 to 1e-17
+    absolute, the round-off of w: `perturbation_response` has the limit of small epsilon;
+    multipliers of modulus below 1e-12 to 1e-20 absolute; with inertia or several states of the law,
+    those below 1e-6 to 1e-14, and those below 1e-7 of the largest to 1e-15 of that).
 
     Orbits are searched for where epsilon is at most 0.999 and the rate of steady sliding per
     radian, about the larger of V/(omega D0) and V K/(omega W0 A), is from 1e-9 to 1e15. Points
