@@ -29,6 +29,7 @@ from asperity.orbit.methods.frequency_continuation import FrequencyContinuation
 from asperity.orbit.methods.from_transient import SettledMotion
 from asperity.orbit.methods.shooting import Shooting
 from asperity.orbit.methods.stroboscopic import StroboscopicMap
+from asperity.orbit.methods.unmodulated import Unmodulated
 from asperity.orbit.outcome import (
     LARGEST_GROWTH,
     LARGEST_RATE,
@@ -75,6 +76,7 @@ def mark_too_unstable(problem: Problem, solution: Solution) -> None:
 
 
 METHODS: tuple[Method, ...] = (
+    Unmodulated(),
     Fourier(),
     Shooting(),
     FourierSeries(),
