@@ -103,8 +103,8 @@ def test_states_beyond_the_exponential_are_refused(states):
 def test_a_force_at_which_the_law_is_not_defined_is_refused():
     for law in ("rice-ruina", "elasto-plastic", "ruina-slip"):
         with pytest.raises(asp.InputError, match="take a law that is, such as 'regularised'"):
-            asp.transient(slider_of(law), HOLD, initial=[-0.2, 0.0])
-    pushed_back = asp.transient(slider_of("regularised"), HOLD, initial=[-0.2, 0.0])
+            asp.transient(slider_of(law), HOLD, initial=[-0.4, 0.0])
+    pushed_back = asp.transient(slider_of("regularised"), HOLD, initial=[-0.4, 0.0])
     assert pushed_back.stopped is None
 
 
