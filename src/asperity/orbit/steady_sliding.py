@@ -10,9 +10,11 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import spectral_radius
-from asperity.loads import Harmonic
+from asperity.arrays import Bool
+from asperity.loads import Harmonic, Modulation
 from asperity.orbit.batches import chunk_of, points_of, put, run_chunks
 from asperity.slider import QuasiStatic
+from asperity.slider.pointwise import excitation_at
 from asperity.slider.problem import Problem
 from asperity.theory.limits import even_phases, slip_pulse
 
@@ -72,3 +74,12 @@ def steady_sliding(problem: Problem) -> SteadySliding:
     for part, values in run_chunks(_compiled, (problem,), points, chunk_of(points, _CHUNK)):
         put(numbers, part, values)
     return numbers
+
+
+def unmodulated(load: Modulation, points: int) -> Bool:
+    """Points at which load, shear force and pulling velocity are constant, shape (points,)."""
+    if isinstance(load, Harmonic):
+        return np.broadcast_to(np.asarray(load.epsilon) == 0, points)
+    at = excitation_at(load, even_phases(_PHASES) * np.ones(points))
+    swings = [np.ptp(part, axis=0) for part in (at.w, at.shear, at.pull)]
+    return np.max(np.broadcast_arrays(*swings, np.zeros(points)), axis=0) == 0

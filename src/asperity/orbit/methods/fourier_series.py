@@ -26,7 +26,7 @@ from asperity.orbit.batches import FEW, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
-from asperity.orbit.steady_sliding import steady_sliding
+from asperity.orbit.steady_sliding import steady_sliding, unmodulated
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.limits import adiabatic_growth, adiabatic_states, even_phases
@@ -156,10 +156,7 @@ def _above_round_off(problem: Problem, Y: Float, at: Index) -> Bool:
     again = _resampled(Y, Y.shape[1] + 2)
     _newton(problem, again, at, 1)
     before, now = (np.fft.rfft(y[0][:, at], axis=0, norm="forward")[1] for y in (Y, again))
-    phases = even_phases(Y.shape[1]) * np.ones(Y.shape[2])
-    excitation = excitation_at(problem.load, phases)
-    swings = [np.ptp(part, axis=0) for part in (excitation.w, excitation.shear, excitation.pull)]
-    steady = np.max(np.broadcast_arrays(*swings), axis=0) == 0
+    steady = unmodulated(problem.load, Y.shape[2])
     return np.asarray((np.abs(now - before) <= _DIGITS * np.abs(before)) | steady[at])
 
 

@@ -12,17 +12,13 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import value_and_jacobian
-from asperity.arrays import Bool
-from asperity.loads import Excitation, Harmonic, Modulation
+from asperity.loads import Excitation
 from asperity.orbit.batches import chunk_of, points_of, put, run_chunks
 from asperity.orbit.observables import Observables
 from asperity.orbit.solution import Method, SearchOptions, Solution
-from asperity.slider.pointwise import excitation_at
+from asperity.orbit.steady_sliding import unmodulated
 from asperity.slider.problem import Problem
-from asperity.theory.limits import even_phases
 
-#: Phases at which a load that is not harmonic is looked at.
-_PHASES = 64
 #: Points in a call.
 _CHUNK = 4096
 #: Largest distance of the law's steady state from that of the equations: a user's law may compute
@@ -40,7 +36,7 @@ class Unmodulated(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; only points without modulation are tried."""
         solution = Solution.unsolved(problem, options)
-        rows = np.flatnonzero(_constant(problem.load, points_of(problem.system)))
+        rows = np.flatnonzero(unmodulated(problem.load, points_of(problem.system)))
         for part, found in run_chunks(_steady, (problem,), rows, chunk_of(rows, _CHUNK)):
             Y, rates, jacobian, force, log_slip, margin = found
             with np.errstate(all="ignore"):
@@ -68,15 +64,6 @@ class Unmodulated(Method):
                 put((orbit.mesh, orbit.centre), at, (even[:, None], Y[:, steady]))
             options.progress(points)
         return solution
-
-
-def _constant(load: Modulation, points: int) -> Bool:
-    """Points at which nothing is modulated."""
-    if isinstance(load, Harmonic):
-        return np.broadcast_to(np.asarray(load.epsilon) == 0, points)
-    at = excitation_at(load, even_phases(_PHASES) * np.ones(points))
-    swings = [np.ptp(part, axis=0) for part in (at.w, at.shear, at.pull)]
-    return np.max(np.broadcast_arrays(*swings, np.zeros(points)), axis=0) == 0
 
 
 @jit_large
